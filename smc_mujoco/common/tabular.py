@@ -420,7 +420,9 @@ def _parts(widths: Sequence[int], width: int, names: int) -> list[list[int]]:
 def _html(cell: Cell | str) -> str:
     """Return a cell as HTML, with the lines below in smaller letters."""
     cell = as_cell(cell)
-    text = html.Html("<br>".join(map(html.text, cell.text.split("\n"))))
+    text = cell.text
+    if not isinstance(text, html.Html):
+        text = html.Html("<br>".join(map(html.text, text.split("\n"))))
     text = html.Html(f"{html.strong(text)}*") if cell.strong else text
     if below := "<br>".join(map(html.text, _below(cell))):
         return html.Html(f'{text}<br><small style="white-space:nowrap">{below}</small>')

@@ -1,8 +1,7 @@
 """The command of the benchmark: enter a law in a suite."""
 
-from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
@@ -10,9 +9,6 @@ from smc_mujoco.cli.commands import options
 from smc_mujoco.cli.console import Terminal
 from smc_mujoco.common.errors import find, printable
 from smc_mujoco.common.interrupts import delay_signals
-
-if TYPE_CHECKING:
-    from smc_mujoco.problems.results import Results
 
 Folder = Annotated[
     str, typer.Argument(metavar="FOLDER", help="A law and entry.toml, or a law of the library.")
@@ -94,8 +90,7 @@ def enter(
     target = entering.enter(folder, suite, seed, results, instances, verify)
     loaded = load(target.parent)
     (name,) = [name for name, entry in loaded.entries.items() if entry.folder == target]
-    for place in _places(loaded, name):
-        terminal.print(place)
+    terminal.print(loaded.places(name), "")
     about = loaded.entries[name].about
     for failure in about["failures"]:
         terminal.note(f"failed: {printable(failure)}")
@@ -126,18 +121,6 @@ def _enter_tracking(
     for line in screen_lines(board.standing(entry)):
         terminal.note(line)
     terminal.wrote(page)
-
-
-def _places(found: "Results", entry: str) -> Iterator[str]:
-    """Yield where an entry stands, in words, for each question."""
-    from smc_mujoco.problems.results import TITLES
-
-    for question, board in found.boards().items():
-        for standing in board.standings:
-            if standing.entry == entry:
-                place = f"place {standing.place} of {len(board.standings)}"
-                reached = f"{100 * standing.reached:.0f} % of the targets"
-                yield f"{TITLES[question]}: {place}, {reached}"
 
 
 def _write_site(results: Path, terminal: Terminal) -> None:

@@ -31,6 +31,7 @@ from smc_mujoco.common.cached import cached_property
 from smc_mujoco.common.data import keyword_dataclass
 from smc_mujoco.common.errors import ScenarioError, find, shown
 from smc_mujoco.common.files import as_path, read_json, reading, slug
+from smc_mujoco.common.tabular import Cell, Tables, Tabular
 from smc_mujoco.problems import enter, entry_runs, suite
 from smc_mujoco.problems.enter import RESULT, TABLE
 from smc_mujoco.problems.problem import problem
@@ -96,22 +97,25 @@ class Standing:
 
 
 @keyword_dataclass
-class QuestionBoard:
-    """A question and the entries' places."""
+class QuestionBoard(Tables):
+    """A question and the entries' places; `print` shows them as a table."""
 
     question: str
     problems: Names
     standings: tuple[Standing, ...]
 
-    def __str__(self) -> str:
-        title = TITLES[self.question]
-        lines = [f"{title}: {WORDS[MEASURE[self.question]]}, {len(self.problems)} problems"]
+    @property
+    def tables(self) -> list[Tabular]:
+        """One table: the entries by place, with a star at those that no other is better than."""
+        rows = []
         for standing in self.standings:
-            rank = f"{standing.rank:5.1f} [{standing.low:.1f}, {standing.high:.1f}]"
-            star = "*" if standing.best else ""
-            share = 100 * standing.reached
-            lines.append(f"{standing.place:>3} {standing.entry:<28} {rank} {share:4.0f} %{star}")
-        return "\n".join(lines)
+            rank = Cell(f"{standing.rank:.1f}", f"{standing.low:.1f}–{standing.high:.1f}")
+            name = Cell(standing.entry, strong=standing.best)
+            rows.append([f"{standing.place}", name, rank, f"{100 * standing.reached:.0f}"])
+        what = f"{WORDS[MEASURE[self.question]]}, {len(self.problems)} problems"
+        heads = "place", "entry", "mean rank", "targets (%)"
+        title = f"{TITLES[self.question]}: {what}"
+        return [Tabular(headings=heads, rows=rows, title=title, name_columns=2)]
 
 
 class EntryResult:
@@ -224,14 +228,23 @@ class Results:
         """Return the board of a question, the best entry first."""
         find("board", question, MEASURE)
         if question not in self._boards:
-            standings = tuple(self._places(question))
+            standings = tuple(self._standings(question))
             problems = tuple(self.on(question))
             self._boards[question] = QuestionBoard(
                 question=question, problems=problems, standings=standings
             )
         return self._boards[question]
 
-    def _places(self, question: str) -> list[Standing]:
+    def places(self, entry: str) -> Tabular:
+        """Return where an entry stands: a row for each question."""
+        rows = []
+        for question, board in self.boards().items():
+            (standing,) = [standing for standing in board.standings if standing.entry == entry]
+            place = Cell(f"{standing.place} of {len(board.standings)}", strong=standing.best)
+            rows.append([TITLES[question], place, f"{100 * standing.reached:.0f}"])
+        return Tabular(headings=("question", "place", "targets (%)"), rows=rows)
+
+    def _standings(self, question: str) -> list[Standing]:
         """Return the places of the entries on a board, the best first."""
         names = list(self.entries)
         medians = self.medians(question)

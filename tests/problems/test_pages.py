@@ -126,9 +126,10 @@ def test_a_table_is_read_once_for_the_medians_and_once_for_each_board(site, monk
 
 def test_a_board_lists_the_better_law_first_and_its_page_says_where_it_is_best(site):
     text = (site / "smc-30@1.html").read_text(encoding="utf-8")
-    for board in re.findall(r"<tbody>.*?</tbody>", text, re.DOTALL):
+    for board in re.findall(r"<table.*?</table>", text):
         assert re.findall(r'/(\w+)\.html"', board) == ["fast", "slow", "odd"]
     page = (site / "smc-30@1" / "odd.html").read_text(encoding="utf-8")
+    assert re.findall(r">(\d of 3)\b", page) == ["3 of 3"] * 4
     for words in ("it diverged", "A &lt;b&gt;", "Where it is best", "Where it is worst"):
         assert words in page
 
