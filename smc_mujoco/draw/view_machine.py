@@ -10,7 +10,7 @@ from viser import ClientHandle, FrameHandle, MeshHandle, SceneNodeDragEvent, Vis
 from smc_mujoco.common.aliases import Array
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.draw import style
-from smc_mujoco.draw.film import arrows, camera, shared_picture, world
+from smc_mujoco.draw.film import arrow_lines, arrows, camera, shared_picture, world
 from smc_mujoco.draw.film.puppet import Puppet, moved_bodies
 from smc_mujoco.draw.film.stage import DEFAULT_RGBA, LAW_SHARE
 from smc_mujoco.draw.session import Session
@@ -79,10 +79,12 @@ class Machines:
         own = float(np.ptp(self.points[: 8 * self.links.sum()], axis=0).max())  # in one pose
         front = self.turn[:, 2]
         self.mounts = []
-        for mount in arrows.mounts(first, joints.tolist(), slides.tolist(), puppet.rail, front):
-            radius = min(mount.radius, arrows.BENT_SIZE * own / len(joints) ** 0.5)
+        for mount in arrow_lines.mounts(
+            first, joints.tolist(), slides.tolist(), puppet.rail, front
+        ):
+            radius = min(mount.radius, arrow_lines.BENT_SIZE * own / len(joints) ** 0.5)
             if first.plant.has_path:  # an arm of the library, where a film writes numbers
-                radius = arrows.USER_RADIUS * own
+                radius = arrow_lines.USER_RADIUS * own
             self.mounts.append(
                 mount._replace(radius=radius, front=front if radius else mount.front)
             )
@@ -348,9 +350,9 @@ class MachineNodes:
                 lines.append(self.line(self.machines.mounts[0], arrow))
         return [line for line in lines if line]
 
-    def line(self, mount: arrows.Mount, arrow: arrows.Arrow) -> Line | None:
+    def line(self, mount: arrow_lines.Mount, arrow: arrows.Arrow) -> Line | None:
         """Return the line of an arrow, and its width, m."""
-        return arrows.path(self.machines.model, self.machines.data, mount, arrow)
+        return arrow_lines.path(self.machines.model, self.machines.data, mount, arrow)
 
 
 def texture_colour(model: mujoco.MjModel, material: int) -> Array:

@@ -11,7 +11,7 @@ import mujoco
 import numpy as np
 
 from smc_mujoco.common.aliases import Array
-from smc_mujoco.draw.film import arrows, world
+from smc_mujoco.draw.film import flat_arrows, world
 
 MOST_TRIANGLES = 10_000  # of the meshes of a model; a processor draws 1000 in about a ms
 FEWEST_TRIANGLES = 200  # of a mesh that has more than its share of those
@@ -204,9 +204,9 @@ def arrow_mesh(line: Array, width: float) -> Mesh:
     """Return an arrow along a line, (m, 3) m, whose shaft is so wide, m, with a film's head."""
     steps = np.linalg.norm(np.diff(line, axis=0), axis=1)
     way = np.append(0.0, steps.cumsum())
-    width = min(width, arrows.MAX_THICKNESS * way[-1])
-    head = 0.5 * arrows.HEAD_WIDTH * width
-    neck = way[-1] - min(arrows.HEAD_LENGTH * head, arrows.HEAD * way[-1])
+    width = min(width, flat_arrows.MAX_THICKNESS * way[-1])
+    head = 0.5 * flat_arrows.HEAD_WIDTH * width
+    neck = way[-1] - min(flat_arrows.HEAD_LENGTH * head, flat_arrows.HEAD * way[-1])
     stations = np.array([0.0, *np.linspace(0.0, neck, ARROW_SIDES), neck, way[-1]])
     radii = np.array([0.0, *np.full(ARROW_SIDES, 0.5 * width), head, 0.0])
     ahead = np.gradient(line, axis=0)

@@ -13,7 +13,7 @@ from PIL import Image, ImageDraw
 from smc_mujoco.common.aliases import Array
 from smc_mujoco.draw import style
 from smc_mujoco.draw.decimate import windows
-from smc_mujoco.draw.film import arrows
+from smc_mujoco.draw.film import arrows, flat_arrows
 from smc_mujoco.draw.film.stage import Stage
 from smc_mujoco.metrics import tip
 
@@ -67,7 +67,7 @@ class Overlay:
         lately = (self.times >= since) & (self.times <= time)
         until = self.path[lately]
         self.trail(image, until, self.stage.track.colour, PATH_WIDTH)
-        stamped: list[arrows.Stamped] = []
+        stamped: list[flat_arrows.Stamped] = []
         if self.forces is not None:
             size = float(np.linalg.norm(self.forces[frame]))
             if size > 0.5:
@@ -80,8 +80,8 @@ class Overlay:
             place = self.stage.find(body) - BLOW_DISTANCE * peak / size
             tail = place - self.newton * peak
             stamped += self.arrow(image, tail, place, size, body)
-        taken = [*self.stage.words, *arrows.boxes(stamped, self.scale)]
-        arrows.write_numbers(image, stamped, self.scale, taken, image.width)
+        taken = [*self.stage.words, *flat_arrows.boxes(stamped, self.scale)]
+        flat_arrows.write_numbers(image, stamped, self.scale, taken, image.width)
         return np.asarray(image)
 
     def trail(
@@ -95,7 +95,7 @@ class Overlay:
         """Draw a path, (m, 3) m, with smooth edges."""
         if len(points) < 2:
             return
-        fine = arrows.SUPERSAMPLING
+        fine = flat_arrows.SUPERSAMPLING
         sides = np.array(image.size)
         pixels = self.stage.project(points)
         line = pixels.clip(-OUTSIDE, sides + OUTSIDE) * fine
@@ -110,7 +110,7 @@ class Overlay:
 
     def arrow(
         self, image: Image.Image, tail: Array, tip: Array, force: float, hits: str
-    ) -> list[arrows.Stamped]:
+    ) -> list[flat_arrows.Stamped]:
         """Draw the arrow of a force, N, between two points, (3,) m: of a contact, or of a blow that
         `hits` a body. It is cut at the edge of the picture. Returns it, or nothing if it points at
         the camera.
@@ -135,7 +135,7 @@ class Overlay:
             return []
         points = np.linspace(line[0], line[1], 40)
         width = SHAFT_WIDTH * self.scale
-        return [arrows.stamp(image, points, width, arrow, round(arrows.RIM * self.scale))]
+        return [flat_arrows.stamp(image, points, width, arrow, round(flat_arrows.RIM * self.scale))]
 
 
 def overlays(stages: Sequence[Stage]) -> list[Overlay]:

@@ -4,8 +4,9 @@ clock.
 In order: pace.py sets the speed; track.py says what each run does at each frame; camera.py lays out
 the tiles, or shared_picture.py carts on one; viewpoint.py finds the side from which a user's
 machine is seen; world.py composes a machine's model, puppet.py poses it, stage.py adds the arrows
-of arrows.py, and canvas.py renders; arm.py draws over arms and what flies; sheet.py is the page
-with the text and the charts, made as figures are; video.py writes.
+of arrows.py (arrow_lines.py says where they lie, flat_arrows.py paints them), and canvas.py
+renders; arm.py draws over arms and what flies; sheet.py is the page with the text and the charts,
+made as figures are; video.py writes.
 Frames are made and written one by one, so that memory does not grow with a film's length.
 """
 

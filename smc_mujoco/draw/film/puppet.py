@@ -11,7 +11,7 @@ import numpy as np
 
 from smc_mujoco.common.aliases import Array
 from smc_mujoco.common.errors import ScenarioError
-from smc_mujoco.draw.film import arrows, camera, viewpoint, world
+from smc_mujoco.draw.film import arrow_lines, arrows, camera, viewpoint, world
 from smc_mujoco.draw.film.camera import Camera
 from smc_mujoco.draw.film.track import MachineTrack
 from smc_mujoco.mechanisms import layout
@@ -114,7 +114,7 @@ class Puppet:
     rail: float  # m, length along x of a cart's rail, on which it stays; inf without a cart
     start: Array  # the pose of joints without a channel, (nq,)
     rotors: Sequence[tuple[int, int]]  # channel, and place in the pose
-    mounts: Sequence[arrows.Mount] = ()  # of a machine that is placed
+    mounts: Sequence[arrow_lines.Mount] = ()  # of a machine that is placed
     height: float = 0.0  # m, of the machine over the film's floor
 
     @classmethod
@@ -319,10 +319,10 @@ class Puppet:
         machine_places = np.concatenate(course.places)
         sides = np.ptp(machine_places, axis=0)
         widest = sides.max(initial=0.0)
-        radius = arrows.BENT_SIZE * float(widest)
+        radius = arrow_lines.BENT_SIZE * float(widest)
         ids = self.ids.tolist()
         slides = self.slides.tolist()
-        joint_mounts = arrows.mounts(self.scenario, ids, slides, self.rail, front)
+        joint_mounts = arrow_lines.mounts(self.scenario, ids, slides, self.rail, front)
         mounts = []
         for mount in joint_mounts:
             smaller = min(mount.radius, radius)
@@ -429,7 +429,7 @@ class Puppet:
         return np.concatenate(moving), np.concatenate(calm)
 
     def lines(
-        self, track: MachineTrack, mounts: Sequence[arrows.Mount]
+        self, track: MachineTrack, mounts: Sequence[arrow_lines.Mount]
     ) -> list[tuple[float, Array]]:
         """Return the lines of arrows on a machine, (m, 3) m each, with their times, s, without
         those of blows, whose tails may leave the picture.
@@ -442,7 +442,7 @@ class Puppet:
             x = track.trace.x[sample, : self.shown]
             pose = self.posed(track, x, drawn.time)
             for i, arrow in drawn.arrows:
-                path = arrows.path(*pose, mounts[i], arrow)
+                path = arrow_lines.path(*pose, mounts[i], arrow)
                 if path and not arrow.body:
                     lines.append((drawn.time, path[0]))
         return lines

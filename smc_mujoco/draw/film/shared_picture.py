@@ -15,7 +15,7 @@ import numpy as np
 from PIL import Image
 
 from smc_mujoco.common.aliases import Array
-from smc_mujoco.draw.film import arrows, camera, world
+from smc_mujoco.draw.film import camera, flat_arrows, world
 from smc_mujoco.draw.film.puppet import Puppet
 from smc_mujoco.draw.film.stage import OUTLINE, Stage
 
@@ -140,8 +140,8 @@ def shots(stages: Sequence[Stage], frame: int, time: float) -> list[Array]:
     ]
     stamped = [stage.stamped(image, own, taken) for stage, own in zip(stages, drawn, strict=True)]
     for own in stamped:
-        taken += arrows.boxes(own, first.scale)
+        taken += flat_arrows.boxes(own, first.scale)
     for own in stamped:
-        arrows.write_numbers(image, own, first.scale, taken, image.width / len(stages))
+        flat_arrows.write_numbers(image, own, first.scale, taken, image.width / len(stages))
     picture = np.asarray(image)
     return [picture[:, left_edge:right] for left_edge, _, right, _ in parts.tolist()]

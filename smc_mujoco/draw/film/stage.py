@@ -14,7 +14,7 @@ from PIL import Image, ImageDraw
 from smc_mujoco.common.aliases import Array
 from smc_mujoco.common.errors import ScenarioWarning, users_stacklevel
 from smc_mujoco.draw import style
-from smc_mujoco.draw.film import arrows, camera, world
+from smc_mujoco.draw.film import arrow_lines, arrows, camera, flat_arrows, world
 from smc_mujoco.draw.film.canvas import Canvas
 from smc_mujoco.draw.film.puppet import Puppet, moved_bodies
 from smc_mujoco.draw.film.sheet import STATE_HEIGHT, STATE_PLACE
@@ -72,7 +72,7 @@ class Stage:
         away = self.place - points.mean(axis=0)
         distance = float(away @ self.turn[:, 2])
         tall = self.size[1] * camera.pixel(self.size) * distance  # m
-        self.find_joints(visible, arrows.MAX_BENT_SHARE * tall)
+        self.find_joints(visible, arrow_lines.MAX_BENT_SHARE * tall)
         self.shape = -1
         self.colour = ""
         film = self.model.camera("film")
@@ -191,7 +191,7 @@ class Stage:
         failed = track.failed(time)
         self.words = []
         if state := track.states[frame]:
-            high = arrows.LETTERS * self.scale
+            high = flat_arrows.LETTERS * self.scale
             wide = STATE_PLACE * high + style.width(state.words, high, bold=True)
             self.words.append(np.array([(0.0, 0.0), (wide, STATE_HEIGHT * high)]))
         goal = None if failed else track.r[frame]
@@ -216,8 +216,8 @@ class Stage:
         if self.followed is not None and self.aimed:
             self.dot_to_goal(image)
         stamped = self.stamped(image, drawn, self.words)
-        taken = [*self.words, *arrows.boxes(stamped, self.scale)]
-        arrows.write_numbers(image, stamped, self.scale, taken, image.width)
+        taken = [*self.words, *flat_arrows.boxes(stamped, self.scale)]
+        flat_arrows.write_numbers(image, stamped, self.scale, taken, image.width)
         return np.asarray(image)
 
     def dot_to_goal(self, image: Image.Image) -> None:
@@ -239,7 +239,7 @@ class Stage:
         image: Image.Image,
         drawn: Sequence[tuple[int, arrows.Arrow]],
         words: Sequence[Array],
-    ) -> list[arrows.Stamped]:
+    ) -> list[flat_arrows.Stamped]:
         """Draw arrows, given as (channel, arrow), over a picture in which words are in boxes of
         (2, 2) px each; return those that are seen.
         """
@@ -252,32 +252,32 @@ class Stage:
     def draw_arrow(
         self,
         image: Image.Image,
-        mount: arrows.Mount,
+        mount: arrow_lines.Mount,
         arrow: arrows.Arrow,
         words: Sequence[Array],
-    ) -> arrows.Stamped | None:
+    ) -> flat_arrows.Stamped | None:
         """Draw an arrow over the picture and return it; nothing, None, if it has no place or points
         at the camera, or if it lies under the words that have its value.
         """
-        path = arrows.path(self.model, self.data, mount, arrow)
+        path = arrow_lines.path(self.model, self.data, mount, arrow)
         if not path:
             return None
         points, width = path
         line = self.project(points)
         length = np.linalg.norm(np.diff(line, axis=0), axis=1).sum()
-        if length < arrows.MIN_PIXELS * self.scale:
+        if length < flat_arrows.MIN_PIXELS * self.scale:
             return None
         beside = points[0] + width * self.turn[:, 1]
         across = self.project(np.array([points[0], beside]))
-        least = arrows.MIN_SHAFT * self.scale * arrow.size
+        least = flat_arrows.MIN_SHAFT * self.scale * arrow.size
         thick = max(float(np.ptp(across[:, 1])), least)
-        if arrow.on_blow and arrows.covers(words, arrows.outline(line, thick)):
+        if arrow.on_blow and flat_arrows.covers(words, flat_arrows.outline(line, thick)):
             return None
         if mount.radius and not arrow.body:
             anchor = self.project(self.data.xanchor[[mount.joint]])[0]
             leader = [*anchor.tolist(), *line[0].tolist()]
             ImageDraw.Draw(image).line(leader, style.INK, max(1, round(self.scale)))
-        return arrows.stamp(image, line, thick, arrow, round(arrows.RIM * self.scale))
+        return flat_arrows.stamp(image, line, thick, arrow, round(flat_arrows.RIM * self.scale))
 
     def project(self, points: Array) -> Array:
         """Return where points (m, 3) m are in the picture, (m, 2) px."""

@@ -10,7 +10,7 @@ from helpers.films import staged, without_charts
 import smc_mujoco as smc
 from smc_mujoco.common import gl
 from smc_mujoco.draw import states, style
-from smc_mujoco.draw.film import arrows, film, world
+from smc_mujoco.draw.film import arrow_lines, arrows, film, world
 from smc_mujoco.draw.film.sheet import label_sizes
 
 SIZE = (800, 450)
@@ -147,9 +147,9 @@ def test_arrows_of_carts_on_one_picture_begin_at_the_side_to_which_they_point(pu
         data.qpos[:] = puppet.start
         world.forward(model, data)
         arrow = arrows.Arrow(0.0, push, arrows.WHITE)
-        arrow_path = arrows.path(model, data, puppet.mounts[0], arrow)
+        arrow_path = arrow_lines.path(model, data, puppet.mounts[0], arrow)
         assert arrow_path
-        cart = arrows.arrow_geom(model, model.jnt_bodyid[puppet.ids[0]])
+        cart = arrow_lines.arrow_geom(model, model.jnt_bodyid[puppet.ids[0]])
         box = world.boxes(model, data)[cart]
         side = box[:, 0].max() if push > 0.0 else box[:, 0].min()
         line = arrow_path[0]

@@ -19,7 +19,7 @@ import smc_mujoco as smc
 from smc_mujoco.common import gl, progress
 from smc_mujoco.draw import states, style
 from smc_mujoco.draw.figure import DrawnRuns
-from smc_mujoco.draw.film import arrows, charts, film, flight, world
+from smc_mujoco.draw.film import arrow_lines, arrows, charts, film, flight, world
 from smc_mujoco.draw.film.sheet import Moment, Sheet, head_lines, label_sizes, least_gains, room_of
 from smc_mujoco.draw.states import State
 
@@ -177,7 +177,7 @@ def test_the_wind_on_a_drone_has_its_arrow_over_it_and_its_path_a_map():
         stage.forward()
         for way in np.eye(3):
             arrow = arrows.Arrow(0.0, 1.0, arrows.WHITE, way=way)
-            arrow_path = arrows.path(stage.model, stage.data, stage.mounts[0], arrow)
+            arrow_path = arrow_lines.path(stage.model, stage.data, stage.mounts[0], arrow)
             assert arrow_path
             drawn = stage.project(arrow_path[0])[:, 1].max()
             tops = world.boxes(stage.model, stage.data)[stage.links].max(axis=1)

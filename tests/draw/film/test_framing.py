@@ -15,7 +15,7 @@ from helpers.sketch import made
 
 import smc_mujoco as smc
 from smc_mujoco.common import gl
-from smc_mujoco.draw.film import arrows, camera, film, puppet, sheet, track, world
+from smc_mujoco.draw.film import arrow_lines, arrows, camera, film, puppet, sheet, track, world
 from smc_mujoco.draw.film.pace import FilmClock
 from smc_mujoco.simulation import model as models
 
@@ -182,7 +182,7 @@ def test_a_pole_is_seen_all_the_way_round_and_its_arrow_is_in_its_plane():
                 mujoco.mj_ray(model, stage.data, stage.place, way, None, 1, -1, hit)
                 assert hit[0] in pole, angles[sample]
             arrow = arrows.Arrow(0.0, 1.0, arrows.WHITE)
-            arrow_path = arrows.path(model, stage.data, stage.mounts[1], arrow)
+            arrow_path = arrow_lines.path(model, stage.data, stage.mounts[1], arrow)
             assert arrow_path
             assert arrow_path[0][:, 1] == pytest.approx(middle[1])
 
@@ -199,13 +199,13 @@ def test_bent_arrows_are_around_their_joint_and_stay_in_the_tile(monkeypatch):
         for stage, mount in itertools.product(stages, stages[0].mounts):
             for part in (-1.0, 1.0):
                 bent_arrow = arrows.Arrow(0.0, part, (0.0,) * 4)
-                arrow_path = arrows.path(stage.model, stage.data, mount, bent_arrow)
+                arrow_path = arrow_lines.path(stage.model, stage.data, mount, bent_arrow)
                 assert arrow_path
                 line, _ = arrow_path
                 anchor = stage.project(stage.data.xanchor[[mount.joint]])
                 radius = np.linalg.norm(stage.project(line) - anchor, axis=1)
                 assert radius.max() == pytest.approx(
-                    arrows.MAX_BENT_SHARE * stage.size[1], rel=0.15
+                    arrow_lines.MAX_BENT_SHARE * stage.size[1], rel=0.15
                 )
                 assert stage.project(line).min() > 0.0
 

@@ -13,7 +13,7 @@ import smc_mujoco as smc
 from smc_mujoco.common import gl
 from smc_mujoco.draw import states, style
 from smc_mujoco.draw.decimate import Envelope
-from smc_mujoco.draw.film import arrows, film, pace
+from smc_mujoco.draw.film import arrows, film, flat_arrows, pace
 
 renders = pytest.mark.skipif(gl.missing() is not None, reason=str(gl.missing()))
 RED = (1.0, 0.0, 0.0, 1.0)
@@ -124,7 +124,7 @@ def test_the_break_of_an_arrow_is_in_its_shaft_however_short(length):
     for cut, parts in ((False, 1), (True, 2)):
         image = Image.new("RGB", (100, 40), "white")
         line = np.linspace((20.0, 20.0), (20.0 + length, 20.0), 40)
-        arrows.stamp(image, line, 5.0, arrows.Arrow(0.0, 1.0, RED, cut=cut))
+        flat_arrows.stamp(image, line, 5.0, arrows.Arrow(0.0, 1.0, RED, cut=cut))
         inked = np.asarray(image)[..., 1] < 128
         _, count = np.asarray(label(inked), object)
         assert count == parts
@@ -138,13 +138,13 @@ def test_the_arrow_of_a_reaction_is_hollow_and_that_of_a_disturbance_has_a_bar()
     line = np.linspace((10.0, 20.0), (80.0, 20.0), 40)
     for hollow in (False, True):
         image = Image.new("RGB", (100, 40), "black")
-        arrows.stamp(image, line, 12.0, arrows.Arrow(0.0, 1.0, RED, hollow=hollow), 2)
+        flat_arrows.stamp(image, line, 12.0, arrows.Arrow(0.0, 1.0, RED, hollow=hollow), 2)
         inside, edge = image.getpixel((20, 20)), image.getpixel((20, 15))
-        assert edge == arrows.bytes_of(RED)
+        assert edge == flat_arrows.bytes_of(RED)
         assert inside == (style.rgb(style.PAPER) if hollow else edge)
-    bare, barred = [arrows.outline(line, 4.0, foot=foot) for foot in (False, True)]
+    bare, barred = [flat_arrows.outline(line, 4.0, foot=foot) for foot in (False, True)]
     widths = [np.ptp(edge[np.abs(edge[:, 0] - 10.0) < 1.0, 1]) for edge in (bare, barred)]
-    assert widths == pytest.approx([4.0, 4.0 * arrows.FOOT_WIDTH])
+    assert widths == pytest.approx([4.0, 4.0 * flat_arrows.FOOT_WIDTH])
     force = Envelope(np.zeros(1), *np.ones((3, 1, 1)))
     acting = dict.fromkeys(("control", "disturbance", "reaction"), force)
     scale = arrows.Scale(1.0, 1.0, 1.0, longest=1.0, full=1.0, units=("N", "N"))

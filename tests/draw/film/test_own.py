@@ -10,7 +10,8 @@ from helpers.films import staged, without_charts
 
 import smc_mujoco as smc
 from smc_mujoco.common import gl
-from smc_mujoco.draw.film.arrows import MAX_SWEEP, Scale, frames, key, path, scales
+from smc_mujoco.draw.film.arrow_lines import MAX_SWEEP, path
+from smc_mujoco.draw.film.arrows import Scale, frames, key, scales
 
 pytestmark = pytest.mark.skipif(gl.missing() is not None, reason=str(gl.missing()))
 SUITE = importlib.util.find_spec("dm_control")

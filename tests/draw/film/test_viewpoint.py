@@ -8,7 +8,7 @@ from PIL import Image
 import smc_mujoco as smc
 from smc_mujoco.common import gl
 from smc_mujoco.draw import style
-from smc_mujoco.draw.film import arrows, camera, puppet, sheet, world
+from smc_mujoco.draw.film import arrows, camera, flat_arrows, puppet, sheet, world
 
 renders = pytest.mark.skipif(gl.missing() is not None, reason=str(gl.missing()))
 ARM = """
@@ -142,7 +142,7 @@ def test_a_chart_keeps_the_unit_of_a_joint_with_a_long_name():
 def test_an_arrow_s_number_hides_neither_the_arrow_nor_what_it_is_at(free, other, place):
     image = Image.new("RGB", (200, 100), "white")
     arrow = arrows.Arrow(0.0, 1.0, (0.0, 0.0, 0.0, 1.0), words="20 N")
-    arrows.write(image, arrow, np.array([other, free]), 0.5, [])
+    flat_arrows.write(image, arrow, np.array([other, free]), 0.5, [])
     y, x = np.nonzero(np.asarray(image)[..., 0] < 128)
     if place == "beyond":
         assert x.min() > free[0]
@@ -162,10 +162,10 @@ def test_numbers_of_arrows_are_apart_and_none_is_written_twice():
     for words, x in (("2.4 N", 150.0), ("2.4 N", 160.0), ("1.3 N", 152.0), ("9 N", 155.0)):
         arrow = arrows.Arrow(0.0, 1.0, black, words=words)
         line = np.linspace((x - 40.0, 100.0), (x, 100.0), 40)
-        drawn.append(arrows.stamp(image, line, 4.0, arrow))
-    taken = arrows.boxes(drawn, 0.5)
+        drawn.append(flat_arrows.stamp(image, line, 4.0, arrow))
+    taken = flat_arrows.boxes(drawn, 0.5)
     before = np.asarray(image).copy()
-    arrows.write_numbers(image, drawn, 0.5, taken, image.width)
+    flat_arrows.write_numbers(image, drawn, 0.5, taken, image.width)
     numbers = taken[sum(len(drawn_arrow.edge) for drawn_arrow in drawn) :]
     assert len(numbers) == 3
     changed = (np.asarray(image) != before).any(axis=2)
@@ -174,8 +174,8 @@ def test_numbers_of_arrows_are_apart_and_none_is_written_twice():
         assert changed[top:bottom, left_edge:right].any()
     for k, number in enumerate(numbers):
         written_numbers = [*taken[:-3], *numbers[:k]]
-        assert arrows.is_apart(number, written_numbers)
-        assert not arrows.is_apart(number, [*written_numbers, number])
+        assert flat_arrows.is_apart(number, written_numbers)
+        assert not flat_arrows.is_apart(number, [*written_numbers, number])
 
 
 @pytest.mark.parametrize(("wide", "count"), [(499.0, 1), (501.0, 2)])
@@ -186,8 +186,8 @@ def test_a_narrow_tile_has_the_number_of_its_longest_arrow_alone(wide, count):
     for words, length, y in (("9 N", 2.0, 60.0), ("400 N", -3.0, 140.0)):
         arrow = arrows.Arrow(0.0, length, (0.0, 0.0, 0.0, 1.0), words=words)
         line = np.linspace((200.0, y), (260.0, y), 40)
-        drawn.append(arrows.stamp(image, line, 4.0, arrow))
+        drawn.append(flat_arrows.stamp(image, line, 4.0, arrow))
     taken = []
-    arrows.write_numbers(image, drawn, 1.0, taken, wide)
+    flat_arrows.write_numbers(image, drawn, 1.0, taken, wide)
     assert len(taken) == count
     assert any(number[:, 1].mean() > 100.0 for number in taken)
