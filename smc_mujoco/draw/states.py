@@ -243,7 +243,7 @@ def at_rest(trace: Trace) -> Array:
 def has_dry_friction(scenario: Scenario) -> Array:
     """Return which channels dry friction can hold, in the joint or under the body, (n,)."""
     plant = scenario.plant
-    model = shapes(scenario)[0].model
+    model = shapes(scenario, scenery=False)[0].model
     rubs = model.dof_frictionloss[dof_ids(model)] > 0.0
     for part in scenario.friction:
         if part.side == "link" and part.keeps_state:

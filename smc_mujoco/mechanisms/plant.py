@@ -36,6 +36,7 @@ EFFORT = {"rad": "N m", "m": "N", "rad/s": "N m", "m/s": "N"}
 # rad or m, chosen: how far beyond its range a joint may start, because MuJoCo's limits are soft
 MAX_EXCESS = 1e-3
 TINY = 1e-12  # SI units; least value of a parameter above 0 that is neither a mass nor a length
+OF_GEOMS = mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE.value
 MAX_PARAMETER = 1e15  # SI units; no parameter of a mechanism is larger
 
 OF_FILE = re.compile(r"\.(xml|urdf|mjb)\b")  # a text that names a model's file
@@ -401,6 +402,13 @@ def compiled_for_runs(spec: mujoco.MjSpec, nuserdata: int) -> mujoco.MjModel:
     # otherwise MuJoCo would reset a diverging run to the initial state and continue
     spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET.value
     return compiled(spec)
+
+
+def leave_out_scenery(spec: mujoco.MjSpec) -> None:
+    """Have a model compiled without geoms that touch nothing and their meshes, half of a
+    humanoid's, if its inertias are not of all geoms.
+    """
+    spec.compiler.discardvisual = spec.compiler.inertiafromgeom != OF_GEOMS
 
 
 def write(model: mujoco.MjModel, fields: Iterator[Field]) -> None:

@@ -38,7 +38,13 @@ from smc_mujoco.mechanisms.layout import (
     state_with,
     unit_wrenches,
 )
-from smc_mujoco.mechanisms.plant import DIRECT_TEXT, Plant, compiled_for_runs, field_array
+from smc_mujoco.mechanisms.plant import (
+    DIRECT_TEXT,
+    Plant,
+    compiled_for_runs,
+    field_array,
+    leave_out_scenery,
+)
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.signals import Push
 
@@ -49,13 +55,12 @@ SENSORS = {
     "v_sensor": mujoco.mjtSensor.mjSENS_JOINTVEL,
 }
 # with which MuJoCo refuses to leave out a geom that has mass
-OF_GEOMS = mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE.value
 # of a tendon around a geom
 ROUND_WRAPS = mujoco.mjtWrap.mjWRAP_SPHERE, mujoco.mjtWrap.mjWRAP_CYLINDER
 # ends of the names of a free body's sensors
 POSE_SENSORS = {"x_sensor": (":x", ":q"), "v_sensor": (":v", ":w")}
 MAX_RECENT = 16  # mechanisms that are kept for later runs, as those of a search for gains; chosen
-MAX_RECENT_BYTES = 160_000_000  # of their models together; chosen
+MAX_RECENT_BYTES = 50_000_000  # of their models together; chosen
 # m, at a start; chosen: bodies in contact overlap by less, so a deeper start begins with a blow
 MAX_OVERLAP = 1e-3
 OBSTACLE = "the obstacle"
@@ -365,7 +370,7 @@ def compile_model(scenario: Scenario, nuserdata: int = 0, scenery: bool = True) 
     edited = spec(scenario)
     plant = scenario.plant
     if not scenery and plant.is_user_model:
-        edited.compiler.discardvisual = edited.compiler.inertiafromgeom != OF_GEOMS
+        leave_out_scenery(edited)
     elif not (scenery or plant.direct):
         without_scenery(edited, pushed(scenario))
     for texture in edited.textures:

@@ -13,9 +13,7 @@ import numpy as np
 
 from smc_mujoco.common.aliases import Array
 from smc_mujoco.draw.film.arrows import MAX_BLOW, Arrow
-from smc_mujoco.mechanisms.plant import catalogue
-from smc_mujoco.simulation import model as models
-from smc_mujoco.simulation.scenario import Scenario
+from smc_mujoco.mechanisms.plant import Plant, catalogue
 
 # Numbers of presentation here are chosen. An arrow's length is stated for the longest one.
 HINGE_LENGTH = 0.425  # of the pendulum's length
@@ -57,17 +55,16 @@ class Mount(NamedTuple):
 
 
 def mounts(
-    scenario: Scenario,
+    plant: Plant,
+    model: mujoco.MjModel,
     joints: Sequence[int],
     slides: Sequence[bool],
     rail: float,
     front: Array,
 ) -> list[Mount]:
-    """Return the Mount of each joint of a machine on a `rail` of that length in m; `front` points
-    to the camera.
+    """Return the Mount of each joint of a machine's model on a `rail` of that length in m; `front`
+    points to the camera.
     """
-    plant = scenario.plant
-    model = models.compile_model(scenario)
     if plant.pose:
         reach = float(model.geom_rbound[model.geom_bodyid > 0].max(initial=0.0))
         slide = Mount(0, FLIGHT_LENGTH * reach, FLIGHT_THICKNESS * reach, None)

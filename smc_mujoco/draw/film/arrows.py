@@ -81,7 +81,7 @@ def weights(trace: Trace) -> Array:
     upright ones, that no hinge turns; 0 on others, whose weight depends on the pose.
     """
     weight_forces = np.zeros(trace.d.shape)
-    for shape in shapes(trace.scenario):
+    for shape in shapes(trace.scenario, scenery=False):
         model = shape.model
         data = mujoco.MjData(model)
         world.forward(model, data)

@@ -24,7 +24,7 @@ import numpy as np
 from matplotlib import rc_context
 from PIL import Image
 
-from smc_mujoco.common import errors, extras, gl
+from smc_mujoco.common import errors, extras, gl, mjcb
 from smc_mujoco.common.aliases import AnyPath, Array, Pair
 from smc_mujoco.common.errors import ScenarioError, items_of, number
 from smc_mujoco.common.files import clear_abandoned, replacing, with_ending
@@ -317,17 +317,20 @@ def pictures(frames: Frames, ahead: bool = False) -> Generator[Array]:
     if clock.close:
         keys.append([f"last periods, deflections × {clock.close.factor:g}"])
     lines = head_lines(runs, size, frames.title, keys)
-    placed = placement(tracks, frames.camera, runs.names, size, lines)
-    order = ""
-    if placed.lanes is not None:
-        order = "back to front"
-        ordered = [[*key, order] for key in keys]
-        lines = head_lines(runs, size, frames.title, ordered)
+    with mjcb.uncached():  # the renderers will need that memory
         placed = placement(tracks, frames.camera, runs.names, size, lines)
+        order = ""
+        if placed.lanes is not None:
+            order = "back to front"
+            ordered = [[*key, order] for key in keys]
+            lines = head_lines(runs, size, frames.title, ordered)
+            placed = placement(tracks, frames.camera, runs.names, size, lines)
+        stages = list(staged(tracks, placed, clock.times))
     arguments = size, placed.tiles, placed.labels, frames.title
     sheet = Sheet(runs, *arguments, keys[0], lines=lines, order=order)
     with contextlib.ExitStack() as opened:
-        stages = [opened.enter_context(stage) for stage in staged(tracks, placed, clock.times)]
+        for stage in stages:
+            opened.enter_context(stage)
         shots = separate_shots
         if placed.lanes is not None:
             shared_picture.hide_between(stages)

@@ -156,9 +156,9 @@ def close_up(traces: Sequence[Trace], fps: float) -> FilmClock | None:
 
 def visible_sizes(scenario: Scenario) -> Array:
     """Return deflections of channels that are seen well, (n,) rad or m."""
-    extent = models.compile_model(scenario).stat.extent
-    units = np.array(scenario.plant.units)
-    return np.where(units == "rad", SEEN_TURN, SEEN_SLIDE * extent)
+    turns = np.array(scenario.plant.units) == "rad"
+    extent = math.nan if turns.all() else models.compile_model(scenario).stat.extent
+    return np.where(turns, SEEN_TURN, SEEN_SLIDE * extent)
 
 
 def rounded(value: float) -> float:

@@ -322,7 +322,8 @@ class Puppet:
         radius = arrow_lines.BENT_SIZE * float(widest)
         ids = self.ids.tolist()
         slides = self.slides.tolist()
-        joint_mounts = arrow_lines.mounts(self.scenario, ids, slides, self.rail, front)
+        plant = self.scenario.plant
+        joint_mounts = arrow_lines.mounts(plant, self.model, ids, slides, self.rail, front)
         mounts = []
         for mount in joint_mounts:
             smaller = min(mount.radius, radius)

@@ -29,7 +29,7 @@ SHAPE_FIELDS = ("geom_pos", "geom_size", "geom_group", "geom_sameframe")
 
 
 class Stage:
-    """The compiled scene of one machine and its renderer: a context, which closes the renderer.
+    """The compiled scene of one machine: a context, which opens and closes its renderer, `canvas`.
 
     `points`, (m, 3) m, are what the machines of a film reach in this view; `alone` is whether the
     film has no other machine; `followed`, (frames, 3) m, is where the camera goes with the machine;
@@ -90,9 +90,9 @@ class Stage:
                 ScenarioWarning,
                 users_stacklevel(),
             )
-        self.canvas = Canvas(self.model, self.data, self.size)
 
     def __enter__(self) -> "Stage":
+        self.canvas = Canvas(self.model, self.data, self.size)
         return self
 
     def __exit__(self, *_: object) -> None:

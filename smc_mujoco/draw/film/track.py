@@ -94,7 +94,7 @@ def leads(trace: Trace, times: Array, edges: Array) -> Array:
     of a play, or what a spring is bent by, which a trace lacks.
     """
     if any(isinstance(part, ElasticJoint) for part in trace.scenario.actuator):
-        model = models.compile_model(trace.scenario)
+        model = models.mechanism(trace.scenario).model
         joints, shafts = model.jnt_qposadr[moving_joints(model)]
         moved = poses(trace, times)
         return moved[:, shafts] - moved[:, joints]
@@ -116,7 +116,7 @@ def motion(trace: Trace, times: Array) -> Motion | None:
     scenario = world.first_channels(trace.scenario)
     if scenario.plant.on_stage and not any(part.loose for part in scenario.contact):
         return None
-    model = models.compile_model(scenario)
+    model = models.mechanism(scenario).model
     ids = joint_ids(model)
     joint_count = len(ids)
     for i in ids:

@@ -22,7 +22,7 @@ from smc_mujoco.common import libmujoco, mjcb, process
 from smc_mujoco.common.errors import ScenarioError, find, number, shown
 from smc_mujoco.mechanisms.custom import file_numbers, urdf
 from smc_mujoco.mechanisms.layout import LEAD, ROTOR
-from smc_mujoco.mechanisms.plant import MAX_PARAMETER
+from smc_mujoco.mechanisms.plant import MAX_PARAMETER, leave_out_scenery
 
 # Attributes that name files, and the folders where a <compiler> may say that they lie. They are
 # found in the text, as MuJoCo reads files that are no XML; those of a comment count, too.
@@ -216,8 +216,10 @@ def _parsed(source: ModelSource) -> mujoco.MjSpec:
 
 @functools.lru_cache(maxsize=MAX_KEPT)
 def unedited_model(source: ModelSource) -> mujoco.MjModel:
-    """Return the model of a source, compiled without an edit, which is shared."""
-    return source.compiled(source.spec())
+    """Return the model of a source, without what is only seen, which is shared."""
+    spec = source.spec()
+    leave_out_scenery(spec)
+    return source.compiled(spec)
 
 
 def _built(spec: mujoco.MjSpec) -> mujoco.MjModel:

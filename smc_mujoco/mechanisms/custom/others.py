@@ -24,6 +24,7 @@ from smc_mujoco.mechanisms.custom.channels import (
     starts,
 )
 from smc_mujoco.mechanisms.custom.mjcf import ModelSource, unedited_model
+from smc_mujoco.mechanisms.plant import leave_out_scenery
 
 OTHERS = ("file", "held", "locked")
 HELD = 2.0 * math.pi * 8.0  # rad/s, chosen: fast beside the channels, slow beside a physics step
@@ -76,6 +77,7 @@ def at_start(
     spec = source.spec()
     if spec.compiler.fusestatic:
         spec.compiler.fusestatic = False
+        leave_out_scenery(spec)
         model = source.compiled(spec)
     else:
         model = unedited_model(source)

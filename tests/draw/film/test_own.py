@@ -4,6 +4,7 @@ import importlib.util
 import warnings
 from pathlib import Path
 
+import mujoco
 import numpy as np
 import pytest
 from helpers.films import staged, without_charts
@@ -116,3 +117,22 @@ def test_a_foreign_machine_has_its_own_floor_or_one_close_below(floor, shown):
     trace = hung(f'<geom type="plane" size="1 1 .1" pos="0 0 {floor}"/>')
     with staged(trace, (640, 360)) as scene:
         assert scene.puppet.height == pytest.approx(-shown, abs=0.01)
+
+
+@without_charts
+def test_a_picture_leaves_no_mesh_in_mujocos_cache(tmp_path):
+    """A humanoid's take as much as all else that is live while it is filmed."""
+    (tmp_path / "a.obj").write_text(
+        "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
+    )
+    (tmp_path / "m.xml").write_text("""<mujoco><asset><mesh name="a" file="a.obj"/></asset>
+      <worldbody><body><joint name="j"/><geom type="mesh" mesh="a"/></body></worldbody>
+      <actuator><motor joint="j"/></actuator></mujoco>""")
+    plant = smc.plant_from(tmp_path / "m.xml", ["j"])
+    cache = mujoco.mj_getCache()
+    capacity = mujoco.mj_getCacheCapacity(cache)
+    assert mujoco.mj_getCacheSize(cache) > 0
+    trace = smc.run(smc.Scenario(plant=plant, law="none", duration=0.01))
+    smc.film(trace, tmp_path / "a.png", at=0.0, size=(320, 180))
+    assert mujoco.mj_getCacheSize(cache) == 0
+    assert mujoco.mj_getCacheCapacity(cache) == capacity > 0

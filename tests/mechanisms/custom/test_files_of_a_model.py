@@ -69,3 +69,20 @@ def test_a_pipe_beside_a_model_that_cannot_be_read_is_not_waited_for(tmp_path):
     (tmp_path / "m.xml").write_text("<mujoco><worldbody><nonsense/></worldbody></mujoco>")
     with pytest.raises(ScenarioError, match="nonsense"):
         smc.plant_from(tmp_path / "m.xml", ["j"])
+
+
+@pytest.mark.parametrize("inertia", ["auto", "true"])
+def test_meshes_that_are_only_seen_are_not_kept_beside_those_of_runs(tmp_path, inertia):
+    (tmp_path / "a.obj").write_text(
+        "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
+    )
+    (tmp_path / "m.xml").write_text(
+        f'<mujoco><compiler inertiafromgeom="{inertia}"/><asset><mesh name="a" file="a.obj"/>'
+        '</asset><worldbody><body><joint name="j"/><geom type="mesh" mesh="a" contype="0" '
+        'conaffinity="0"/></body></worldbody></mujoco>'
+    )
+    plant = smc.plant_from(tmp_path / "m.xml", {"j": smc.Channel(motor=True)})
+    model = mjcf.unedited_model(mjcf.source(tmp_path / "m.xml"))
+    assert plant.load().nmesh == 1
+    assert model.nmesh == (inertia == "true")  # where its inertia is of the mesh alone
+    assert model.body_mass.tolist() == plant.load().body_mass.tolist()
