@@ -100,11 +100,11 @@ class Answer(Tables):
         screen = dataclasses.replace(self.screen, report="")  # the page does not point at itself
         parts = [screen_html(screen), *self.pictures]
         for table in self.tables:
-            parts.append(table._repr_html_())
+            parts.append(table.as_html())
         if self.words:
             rows = [explain(word).split("\n", 1) for word in self.words]
             words = Tabular(headings=("word", "meaning"), rows=rows, name_columns=2)
-            parts.append(words._repr_html_())
+            parts.append(words.as_html())
         page = html.page(self.title, parts)
         with replacing(Path(path)) as file:
             file.write_text(page, encoding="utf-8")

@@ -193,12 +193,16 @@ class Tabular:
         return [*textwrap.wrap(name, least, break_long_words=False), unit]
 
     def _repr_html_(self) -> str:
+        return self.as_html(MAX_HTML_ROWS)
+
+    def as_html(self, most: int | None = None) -> str:
+        """Return the table as HTML; of more rows than `most` only their number."""
         heads = [heading.replace("^2", "²") for heading in self.headings]
         rule = "font-weight:normal;border-bottom:1px solid currentColor;"
         lines = [self._html_row("th", heads, rule)] if any(heads) else []
-        lines += [self._html_row("td", row) for row in self.rows[:MAX_HTML_ROWS]]
-        more = len(self.rows) - MAX_HTML_ROWS
-        notes = [f"and {more} more"] if more > 0 else []
+        lines += [self._html_row("td", row) for row in self.rows[:most]]
+        more = len(self.rows) - len(self.rows[:most])
+        notes = [f"and {more} more"] if more else []
         for note in [*notes, *self.notes]:
             side = f'colspan="{len(self.headings)}" style="{HTML_CELL}left;opacity:0.75"'
             lines.append(f"<tr><td {side}><div>{html.text(note)}</div></td></tr>")

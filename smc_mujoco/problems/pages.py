@@ -77,9 +77,9 @@ def _index(suites: Sequence[Results], left_out: Sequence[str]) -> Iterator[str]:
         counts = f"{len(of_suite.problems)} problems, {len(of_suite.entries)} entries"
         title = f"{of_suite.title}: {counts}"
         heads = "question", "first on its board"
-        yield Tabular(headings=heads, rows=rows, title=title, name_columns=2)._repr_html_()
+        yield Tabular(headings=heads, rows=rows, title=title, name_columns=2).as_html()
     if left_out:
-        yield Tabular(headings=("left out",), rows=[[why] for why in left_out])._repr_html_()
+        yield Tabular(headings=("left out",), rows=[[why] for why in left_out]).as_html()
 
 
 def _suite_page(of_suite: Results, folder: str) -> Iterator[str]:
@@ -96,7 +96,7 @@ def _suite_page(of_suite: Results, folder: str) -> Iterator[str]:
             link = _link(cell.text, _address(folder, cell.text))
             rows.append([place, cell._replace(text=link), *numbers])
         table = dataclasses.replace(table, rows=rows, notes=[ASKS[question]])
-        yield table._repr_html_() + _curves(of_suite, board)
+        yield table.as_html() + _curves(of_suite, board)
 
 
 def _entry_page(of_suite: Results, name: str, folder: str) -> Iterator[str]:
@@ -109,11 +109,11 @@ def _entry_page(of_suite: Results, name: str, folder: str) -> Iterator[str]:
     )
     if about["failed"]:
         yield _paragraph(f"failed runs: {about['failed']}, as {'; '.join(about['failures'])}")
-    yield of_suite.places(name)._repr_html_()
+    yield of_suite.places(name).as_html()
     for kind, rows in extremes(of_suite, name).items():
         heads = "problem", "question", "place", "median"
         title = f"Where it is {kind}"
-        yield Tabular(headings=heads, rows=rows, title=title, name_columns=2)._repr_html_()
+        yield Tabular(headings=heads, rows=rows, title=title, name_columns=2).as_html()
     ran = f"{about['instances']} instances of each problem, of the seed {about['seed']}."
     if about["sample"]:
         median, high, times = about["sample"]

@@ -524,12 +524,9 @@ class Recommendation(Answer):
         for about, comparison in titles:
             if comparison is None:
                 continue
-            order = [law for law in self.race.running if law in comparison.laws]
-            order += [law for law in comparison.laws if law not in order]
-            first = comparison.winners[0] or order[0]
-            for rival in order:
-                if rival == first:
-                    continue
+            order = dict.fromkeys([*comparison.winners, *self.race.running, *comparison.laws])
+            first, *rivals = [law for law in order if law in comparison.laws]
+            for rival in rivals:
                 effect = comparison.effect(0, first, rival)
                 places = comparison.laws.index(first), comparison.laws.index(rival)
                 p = number(float(comparison.p[0][places]), 2)
@@ -574,12 +571,11 @@ class Recommendation(Answer):
     def _table_of_margins(self) -> Tabular:
         """What the first law withstands."""
         rows = []
-        margins = [*self.margins]
-        labels = [margin.kind for margin in margins]
+        margins = {margin.kind: margin for margin in self.margins}
         if self.tolerance.opposed:
-            margins.append(self.tolerance.opposed)
-            labels.append(f"friction, {joined(self.tolerance.helped)} from the other side")
-        for label, margin in zip(labels, margins, strict=True):
+            side = f"{joined(self.tolerance.helped)} from the other side"
+            margins[f"friction, {side}"] = self.tolerance.opposed
+        for label, margin in margins.items():
             not_held = ""
             if not margin.open and margin.resolution:
                 not_held = number(margin.value + margin.resolution)

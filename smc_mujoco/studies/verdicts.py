@@ -26,7 +26,7 @@ class BlockComparison(NamedTuple):
     """The laws of a comparison in one of its blocks."""
 
     comparison: Comparison
-    index: int  # of the block
+    block: int
     metric: str
     floor: str  # in words, such as "0.01 rad"; "" where it is not known
     family: int  # number of blocks for which winners are corrected
@@ -34,11 +34,11 @@ class BlockComparison(NamedTuple):
 
     def named(self, chosen: Array) -> Names:
         """Return the laws of which an array (laws, blocks) is true."""
-        return tuple(np.array(self.comparison.laws)[chosen[:, self.index]].tolist())
+        return tuple(np.array(self.comparison.laws)[chosen[:, self.block]].tolist())
 
     def by_law(self, values: Array) -> dict[str, Any]:
         """Return law -> its value in an array (laws, blocks)."""
-        return dict(zip(self.comparison.laws, values[:, self.index].tolist(), strict=True))
+        return dict(zip(self.comparison.laws, values[:, self.block].tolist(), strict=True))
 
     @property
     def label(self) -> str:
@@ -58,7 +58,7 @@ class BlockComparison(NamedTuple):
     @property
     def order(self) -> list[str]:
         """The winner first, then by failed runs, then by median."""
-        winner = self.comparison.winners[self.index]
+        winner = self.comparison.winners[self.block]
         lacking = self.by_law(self.comparison.without_value)
         medians = self.by_law(self.comparison.centres)
         return sorted(medians, key=lambda law: (law != winner, lacking[law], medians[law]))
@@ -69,7 +69,7 @@ class BlockComparison(NamedTuple):
     def verdict(self) -> Verdict | None:
         """Who wins, or why nobody does; None for a single law."""
         laws = self.comparison.laws
-        winner = self.comparison.winners[self.index]
+        winner = self.comparison.winners[self.block]
         barred = tuple(law for law in self.untuned if law != winner)
         if len(laws) < 2:
             return None
@@ -83,11 +83,11 @@ class BlockComparison(NamedTuple):
 
     def lead(self, winner: str) -> Lead:
         """Return the least lead of the winner; of a share it has no numbers."""
-        comparison, index = self.comparison, self.index
+        comparison, block = self.comparison, self.block
         if comparison.shares:
             return Lead(law=winner, rival="", metric=self.label)
         rivals = [law for law in self.order[1:] if law not in self.few]
-        rival, effect = nearest(comparison, index, winner, rivals)
+        rival, effect = nearest(comparison, block, winner, rivals)
         lacking = self.by_law(comparison.without_value)[rival]
         medians = self.by_law(comparison.centres)
         numbers = {}
@@ -100,7 +100,7 @@ class BlockComparison(NamedTuple):
             law=winner,
             rival=rival,
             metric=self.label,
-            gaps=f"{lacking} of {comparison.seeds[index]}" if lacking else "",
+            gaps=f"{lacking} of {comparison.seeds[block]}" if lacking else "",
             floor=self.floor if effect.below else "",
             ahead=effect.ahead,
             samples=effect.samples,
@@ -112,9 +112,9 @@ class BlockComparison(NamedTuple):
     @property
     def _undecided(self) -> Tied | Open:
         """Why no law wins, where one might."""
-        comparison, index, metric = self.comparison, self.index, self.label
+        comparison, block, metric = self.comparison, self.block, self.label
         laws, best = comparison.laws, self.named(comparison.best)
-        if self.metric == SETTLES and {*comparison.centres[:, index].tolist()} in ({0.0}, {1.0}):
+        if self.metric == SETTLES and {*comparison.centres[:, block].tolist()} in ({0.0}, {1.0}):
             return Tied(metric=metric, laws=laws)
         lowest = self.named(comparison.below)
         if lowest != laws or self.away:
@@ -123,8 +123,8 @@ class BlockComparison(NamedTuple):
             return Tied(metric=metric, laws=lowest, floor=self.floor)
         if needed := self.needed:
             return Open(metric=metric, laws=laws, needed=needed, unit=self.unit)
-        starred = comparison.best[:, index]
-        if len(best) > 1 and comparison.level[index][np.ix_(starred, starred)].all():
+        starred = comparison.best[:, block]
+        if len(best) > 1 and comparison.level[block][np.ix_(starred, starred)].all():
             return Tied(metric=metric, laws=best)
         hidden, charged = self._hidden
         return Open(
@@ -145,7 +145,7 @@ class BlockComparison(NamedTuple):
         if not comparison.shares:
             first, *rivals = [law for law in self.order if law in best] or [""]
             for rival in rivals:
-                pair = self.index, first, rival
+                pair = self.block, first, rival
                 leads.append((comparison.visible(*pair), comparison.charged(*pair)))
         return max(leads, key=lambda lead: (not math.isnan(lead[0]), lead[0]))
 
@@ -153,7 +153,7 @@ class BlockComparison(NamedTuple):
     def behind(self) -> dict[str, Trails]:
         """The laws that others are better than."""
         comparison, order = self.comparison, self.order
-        better = comparison.better[self.index]
+        better = comparison.better[self.block]
         behind = {}
         for law in order[1:]:
             beaten_by = better[:, comparison.laws.index(law)]
@@ -162,7 +162,7 @@ class BlockComparison(NamedTuple):
                 continue
             times = math.nan
             if not comparison.shares:
-                effect = comparison.effect(self.index, ahead[0], law)
+                effect = comparison.effect(self.block, ahead[0], law)
                 if not effect.below and 0.0 < effect.value < math.inf:
                     times = 1.0 / effect.value
             behind[law] = Trails(
@@ -176,15 +176,15 @@ class BlockComparison(NamedTuple):
     def samples(self) -> int:
         """The largest number of samples of any two laws; for one law, of its runs."""
         if len(self.comparison.laws) == 1:
-            return int(self.comparison.seeds[self.index])
-        return int(self.comparison.samples[self.index].max())
+            return int(self.comparison.seeds[self.block])
+        return int(self.comparison.samples[self.block].max())
 
     @property
     def _sets(self) -> tuple[int, bool]:
         """The smallest number of sets of gains of a law that has several, 1 if none has, and
         whether a law has one set.
         """
-        sets = self.comparison.sets[:, self.index]
+        sets = self.comparison.sets[:, self.block]
         return min(sets[sets > 1].tolist(), default=1), bool((sets == 1).any())
 
     @property
@@ -222,7 +222,7 @@ class BlockComparison(NamedTuple):
         """Return what a number is of, in so many seeds in which every law ran. In some every law
         may repeat an earlier result.
         """
-        runs = int(self.comparison.seeds[self.index])
+        runs = int(self.comparison.seeds[self.block])
         sets, single = self._sets
         return Fact(
             "sample",
