@@ -130,7 +130,8 @@ def mechanism(scenario: Scenario) -> Mechanism:
         base = compile_model(scenario, USERDATA, scenery=False)
         shared = _mechanisms[key] = Mechanism(base, channels(base))
         mechanisms = [*_recent, shared][-MAX_RECENT:]
-        while sum(mujoco.mj_sizeModel(recent.model) for recent in mechanisms) > MAX_RECENT_BYTES:
+        sizes = [mujoco.mj_sizeModel(recent.model) for recent in mechanisms]
+        while len(mechanisms) > 1 and sum(sizes[-len(mechanisms) :]) > MAX_RECENT_BYTES:
             del mechanisms[0]
         _recent[:] = mechanisms
     elif source := getattr(scenario.plant.build, "source", None):  # of a user's model

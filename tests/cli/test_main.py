@@ -3,6 +3,7 @@ for every mistake.
 """
 
 import functools
+import itertools
 import json
 import os
 import re
@@ -692,6 +693,13 @@ def test_a_film_of_an_answer_has_as_many_pictures_as_its_time_allows(tmp_path, m
     assert not list(tmp_path.iterdir())
     with monkeypatch.context() as patch:
         patch.setattr(studies, "MADE", 0.0)  # no share of the time is left for pictures
+        looks = itertools.count()  # at a clock that goes on by 1 s: a picture takes one
+        patch.setattr(studies, "time", types.SimpleNamespace(monotonic=lambda: next(looks)))
+        studies._film(recommendation, tmp_path, 5.5, terminal)  # s, the fifth look and a half
+        assert "no time for a film" in said.pop()
+        assert not list(tmp_path.iterdir())
+    with monkeypatch.context() as patch:
+        patch.setattr(studies, "MADE", 0.0)
         studies._film(recommendation, tmp_path, time.monotonic() + 600.0, terminal)
     assert said[0] == tmp_path / "worst.png"
     assert re.search(r"in place of a film, which would take \d+ s\b", said[1])
