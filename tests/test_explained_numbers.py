@@ -25,6 +25,7 @@ from smc_mujoco.simulation import (
     force_bounds,
     integration,
     signals,
+    suite_conditions,
     time_series,
 )
 from smc_mujoco.studies import race
@@ -146,8 +147,8 @@ SAID = {
         f"up to a {PARTS[integration.MIN_JITTER_STEPS]} of the clock's jitter",
         f"0 .. 2^{math.log2(constraints.MAX_SEED + 1):g} - 1",
     ],
-    conditions: [
-        f"{force_bounds.U_MAX / conditions.BOUNDS_PER_FRICTION:g} N m or N in the study",
+    suite_conditions: [
+        f"{force_bounds.U_MAX / suite_conditions.BOUNDS_PER_FRICTION:g} N m or N in the study",
         f"late by up to {part(under('jitter')['clock'].jitter / conditions.CONTROL_PERIOD)} of the",
         f"one sample in {round(1 / under('missed')['clock'].missed)} does".replace("10", "ten"),
     ],

@@ -16,7 +16,7 @@ from typing import Any
 from smc_mujoco.mechanisms.hardware.part import Actuator, Friction
 
 MAX_STEP = 1e-3  # s; the ideal plants under RK4 follow their equations to 1e-9 at this step
-# s; tests/simulation/test_convergence.py measures what halving it changes, see docs/design.md
+# s; tests/simulation/test_convergence.py measures what halving it changes
 REALISTIC_STEP = 2.5e-4
 # s, of walls, balls and stops on a user's model: at 1 ms blows under chatter err 50 times as much
 BLOW_STEP = 5e-4

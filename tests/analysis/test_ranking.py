@@ -230,6 +230,8 @@ def test_a_law_better_by_little_in_every_run_wins_although_the_medians_intervals
     effect = comparison.effect(0, "a", "b")
     assert effect[:3] == pytest.approx((1 / 1.05, 1 / 1.05, 1 / 1.05))
     assert (effect.ahead, effect.samples, effect.sets) == (20, 20, False)
+    spread = Comparison({"a": A, "b": B}).effect(0, "a", "b")
+    assert spread.low < spread.value < spread.high < 1.0
     unpaired = np.random.default_rng(1).permutation(scores["b"][0])
     assert Comparison({"a": scores["a"], "b": unpaired}).best.all()
     # nor does a law that is always last hide it

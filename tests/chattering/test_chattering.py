@@ -195,33 +195,6 @@ def test_the_describing_function_of_play_is_that_of_a_run_under_a_sine(gap, omeg
     assert fit / loop.response(omega) == pytest.approx(play(abs(fit), loop.gap), abs=0.01)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("law", "gap"),
-    [
-        ("twisting", 2e-2),
-        ("quasi_continuous", 2e-3),
-    ],
-)
-def test_predicted_chattering_behind_play_is_that_of_a_run(law, gap):
-    gear = smc.Backlash(gap, rotor_inertia=5e-3)
-    scenario = smc.Scenario(
-        plant="duffing",
-        law=at_defaults(law),
-        x0=0.02,
-        duration=6.0,
-        actuator=(smc.Lag(0.01), gear),
-    )
-    cycle = chattering(scenario)
-    # with play, positions lead by half a step
-    short = dataclasses.replace(scenario, physics_step=6.25e-5)
-    assert (cycle.amplitude, cycle.frequency) == pytest.approx(measured(smc.run(short)), rel=0.03)
-    rigid = chattering(
-        dataclasses.replace(scenario, actuator=(smc.Lag(0.01), dataclasses.replace(gear, gap=0.0)))
-    )
-    assert cycle.amplitude > 1.03 * rigid.amplitude
-
-
 @pytest.mark.parametrize("counts", [2_000])
 def test_a_coarse_encoder_s_count_moves_s_as_in_a_run(counts):
     scenario = smc.Scenario(
@@ -297,7 +270,6 @@ def test_a_relay_without_an_actuator_chatters_from_sample_to_sample():
 RELAY = smc.law("classical", k=4.0, c=2.5)
 
 
-@pytest.mark.slow
 def test_samples_delay_a_relay_by_half_a_period_and_a_smooth_law_by_none():
     scenario = smc.Scenario(
         plant=smc.plant("duffing", **INTEGRATOR), law=RELAY, actuator=smc.Lag(0.01)

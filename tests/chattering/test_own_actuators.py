@@ -43,18 +43,7 @@ def test_predicted_chattering_has_the_servo_s_spring(law, late):
     assert predicted.frequency == pytest.approx(1e3 * np.diff(turns).mean() ** -1, rel=0.02)
 
 
-def test_predicted_chattering_has_the_filter_of_a_servo_once():
-    fields = {"law": smc.law("classical", k=0.2, c=8.0), "x0": 0.1, "input_delay": 0.01}
-    filtered = servo(' timeconst=".01"')
-    own = smc.Scenario(plant=filtered, **fields, duration=6.0)
-    lagged = smc.Scenario(plant=servo(), actuator=smc.Lag(0.01), **fields)
-    predicted = smc.design.chattering(own)
-    assert smc.design.chattering(lagged).frequency == pytest.approx(predicted.frequency)
-    (trace,) = smc.run([own])
-    turns = np.flatnonzero(np.diff(np.sign(trace.x[trace.t > 4.0, 0])) > 0)
-    assert predicted.frequency == pytest.approx(1e3 / np.diff(turns).mean(), rel=0.03)
-
-
+@pytest.mark.quick
 def test_chattering_is_not_predicted_for_a_goal_or_steps_of_a_set_point():
     stepped = smc.Scenario(plant=servo(set_point_step=0.01), law="classical")
     with pytest.raises(ScenarioError, match=r"goal 0 and step 0.01: measure it in a run"):

@@ -382,3 +382,41 @@ def test_the_clamp_of_third_order_super_twisting_holds_both_integrals():
     assert np.abs(run.memory[:, 1]).max() < 2.0
     below = [plant_a(third_order(w_max=w), constant(0.3)).residual() for w in (0.5, math.inf)]
     assert below[0] == pytest.approx(below[1], abs=1e-6)
+
+
+def test_twisting_is_siconos_explicit_one():
+    """An independent implementation, x'' = 19 x - 2 x' + u, u held over 50 ms: the published (x,
+    x').
+    """
+    plant = smc.plant(
+        "duffing",
+        M=1.0,
+        delta=2.0,
+        alpha=-19.0,
+        beta=0.0,
+    )
+    scenario = smc.Scenario(
+        plant=plant,
+        law=law("twisting", r1=300.0, r2=60.0),
+        x0=-15.0,
+        v0=20.0,
+        control_period=0.05,
+        physics_step=1e-3,
+        u_max=math.inf,
+        duration=1.5,
+        integrator="RK4",
+    )
+    trace = smc.run(scenario)
+    published = {
+        0.05: (-14.09545908221278, 16.38486565996921),
+        0.85: (2.395615641163373, 52.44596952716989),
+        1.5: (-3.460806002951802, 6.786006803216882),
+    }
+    for t, state in published.items():
+        k = round(t / 0.05)
+        np.testing.assert_allclose(
+            (trace.x[k, 0], trace.v[k, 0]),
+            state,
+            rtol=0,
+            atol=1e-8,
+        )

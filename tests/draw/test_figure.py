@@ -163,6 +163,12 @@ def test_chattering_is_drawn_as_its_mean_without_teeth():
     )
 
 
+def test_a_band_has_its_whole_width_at_the_end_of_a_run_that_ends_soon_after_a_switch():
+    u = switching([15] * 38)[:569]  # the last value is held for 14 samples
+    _, low, high = decimate.band(1e-3 * np.arange(569), u[:, None])
+    assert (low[-1], high[-1]) == (-6.0, 6.0)
+
+
 def test_chattering_is_six_reversals_close_together_and_reaches_over_short_rests():
     """For a window of 40 samples: each within 10 of the one before, rests of up to 10, 39 and 40
     samples.

@@ -344,31 +344,9 @@ def test_words_tell_of_a_band_only_where_one_is_seen(one):
         assert ("band: range of u" in str(page.get_label())) == seen
 
 
-@pytest.mark.parametrize("size", [None, COLUMN])
-def test_an_empty_title_draws_none_and_closes_the_gap(size, one):
-    def top(page):
-        page.draw_without_rendering()
-        height = page.get_figheight() * page.dpi
-        return height - max(ax.get_tightbbox().y1 for ax in page.axes), height
-
-    panels = ["x", "u"]
-    usual, height = top(figure([one], size=size, panels=panels))
-    (label,) = style.labels([one], None)
-    for title in ("", " "):
-        page = figure([one], size=size, title=title, panels=panels)
-        (legend,) = page.legends
-        assert label in [text.get_text() for text in legend.get_texts()]
-        assert not legend.get_title().get_text()
-        gap, lower = top(page)
-        big = style.points(pages.TITLE_SIZE) * page.dpi / 72 if size is None else 0.0
-        assert gap < usual - big
-        assert lower < height or size is None, "a page has its usual shape"
-        assert not page.artists, "nothing is beside the title"
-        assert "gains: default" in str(page.get_label())
-    alone = plt.figure().subplots()
-    figure([one], ax=alone, title=" ")
-    assert not alone.get_title()
-    plt.close("all")
+def test_an_empty_title_draws_none(one):
+    (legend,) = figure([one], size=COLUMN, title=" ", panels=["u"]).legends
+    assert not legend.get_title().get_text()
 
 
 def test_the_error_is_the_largest_within_its_window_on_a_logarithmic_axis(one):

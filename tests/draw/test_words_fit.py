@@ -10,7 +10,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from helpers.boxes import check, recorded, words_of
-from helpers.sources import loaded
 
 import smc_mujoco as smc
 from smc_mujoco.common import gl
@@ -19,7 +18,6 @@ from smc_mujoco.draw.film import film
 from smc_mujoco.studies import scene as scenes
 
 ROOT = Path(__file__).parents[2]
-gallery = loaded(ROOT / "videos" / "gallery.py")
 LONGEST = 1.0  # s, of a run, whose words are those of the whole
 SMALLEST = 0.5  # of a tile's height or width, for its machine
 
@@ -77,17 +75,5 @@ def test_a_scene_s_pictures_cut_and_overprint_nothing(name, monkeypatch):
         check_curves(page)
     half_time = 0.5 * min(trace.t[-1] for trace in traces)
     [*_] = film.Frames(traces, labels, title, camera=chosen, at=half_time)
-    check(boxes)
-    assert min(shares) >= SMALLEST
-
-
-@pytest.mark.slow
-@pytest.mark.skipif(gl.missing() is not None, reason=str(gl.missing()))
-@pytest.mark.parametrize("name", gallery.CLIPS)
-def test_a_clip_cuts_and_overprints_nothing(name, monkeypatch):
-    boxes, shares = recorded(monkeypatch)
-    frames = gallery.CLIPS[name].frames()
-    frames.clock = frames.clock.part(0.5, 0.55)
-    [*_] = frames
     check(boxes)
     assert min(shares) >= SMALLEST

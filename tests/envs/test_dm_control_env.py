@@ -194,15 +194,6 @@ def test_tasks_are_for_the_plants_that_have_them():
     assert {"swing_up", "synchronise"} <= set(tasks.tasks("inverted_pendulum_network"))
 
 
-@pytest.mark.slow
-def test_a_swing_up_cannot_push_the_pendulum_up_and_energy_can():
-    environment = suite.load("inverted_pendulum", "swing_up", random=0)
-    last = driven_by_dm(environment, lambda timestep: np.array([1.5]))[:, 0]
-    assert np.abs(last - np.pi).max() < 2.0
-    act = smc.envs.agent(smc.law("swing_up"), environment)
-    assert np.cos(driven_by_dm(environment, act)[-1, 0]) > 0.999
-
-
 def test_a_plant_that_diverges_within_a_step_ends_its_episode_and_the_next_one_begins():
     environment = suite.load(
         "duffing",

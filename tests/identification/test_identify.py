@@ -343,22 +343,6 @@ def test_drawn_sets_have_the_errors_and_correlations_found(moved):
     assert wide.std() == pytest.approx(0.05 * identified.values["mass"], rel=0.1)
 
 
-@pytest.mark.slow
-def test_values_that_are_only_tried_warn_of_nothing(moved, recwarn):
-    """The motor gives 352 N at rest.
-
-    It holds an offset of 340 N, and not the greater ones that the search tries.
-    """
-    smc.identify(
-        AXIS.with_values({"offset": -340.0}),
-        moved,
-        ["offset"],
-        starts=6,
-        most=2,
-    )
-    assert not [warning for warning in recwarn if "DCMotor gives at most" in str(warning.message)]
-
-
 def test_residuals_are_what_was_measured_less_what_was_predicted(tmp_path, monkeypatch):
     drawn = []
     monkeypatch.setattr(Figure, "savefig", lambda figure, *_, **__: drawn.append(figure))

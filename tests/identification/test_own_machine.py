@@ -207,12 +207,6 @@ def test_numbers_found_are_a_condition_that_files_and_runs_take(found, arm, tmp_
     np.testing.assert_allclose(ours.x, theirs.x, atol=1e-9)
 
 
-def test_sets_differ_by_the_floor_where_the_errors_are_smaller(found):
-    sets = found.drawn(400, seed=2).ensemble
-    damping = np.array([drawn["j1.damping"] for drawn in sets])
-    assert damping.std() == pytest.approx(0.05 * found.values["j1.damping"], rel=0.1)
-
-
 def test_a_joint_s_number_is_a_parameter_that_a_mismatch_changes():
     damped = smc.plant_from(ONE.replace('name="j1"', 'name="j1" damping=".2"'), ["j1"])
     common = {"plant": damped, "law": "none", "feedforward": smc.Sine(2.5, 3.0), "duration": 1.0}
@@ -576,26 +570,6 @@ def shares(told, expected):
 
 
 @pytest.mark.slow
-def test_a_servo_plays_a_motion_as_its_set_point_and_its_log_tells_the_expected_errors():
-    """Within a factor of 2, fixed before; of a log by MuJoCo alone."""
-    servo = '<position joint="j1" kp="60" kv="3" ctrlrange="-1.5 1.5" forcerange="-12 12"/>'
-    xml = chain([0.5], [0.8]).replace('<motor joint="j1"/>', servo)
-    truth = {"j1.damping": 0.4, "j1.frictionloss": 0.3, "j1.armature": 0.03}
-    arm = smc.plant_from(xml, {"j1": smc.Channel(servo=True)})
-    advice = smc.design.excitation(arm, list(truth), guess=truth, duration=5.0)
-    for motion in advice.motions:
-        assert motion.largest_u <= 1.5
-        rates = np.gradient(motion.positions[0], motion.times)
-        assert motion.largest_v < 2.0 * np.abs(rates).max(), motion.name
-    best = advice.motions[0]
-    run = servo_log(xml, truth, np.array(best.times), np.array(best.positions[0]))
-    identified = smc.identify(arm, run, list(truth))
-    for name, share in shares(identified.errors, best.errors).items():
-        assert 0.5 < share < 2.0, (name, share)
-        assert abs(identified.values[name] - truth[name]) < 2.0 * identified.errors[name], name
-
-
-@pytest.mark.slow
 def test_expected_errors_are_those_that_logs_of_the_motion_tell():
     """Within a factor of 2, fixed before; in the median of three logs by the other simulation,
     whose controller tracks the motion. What one log tells is chance in part.
@@ -685,7 +659,7 @@ def test_the_start_knows_where_other_joints_are_held():
     arm = smc.plant_from(xml, ["j2"], keyframe="home", others="held")
     true = {"j2.damping": 0.2, "j2.armature": 0.01}
     push = smc.Sine(1.0, 4.0) + smc.Sine(0.5, 11.0)
-    run = smc.Scenario(plant=arm, mismatch=true, law="none", feedforward=push, duration=4.0)
+    run = smc.Scenario(plant=arm, mismatch=true, law="none", feedforward=push, duration=2.0)
     guess = first_guess(*own_rig(arm, list(true)).reading([smc.run(run)]))
     for name, value in true.items():
         assert guess.values[name] == pytest.approx(value, rel=0.15), name

@@ -862,67 +862,6 @@ def random_runs(draw):
     )
 
 
-@pytest.mark.slow
-@settings(max_examples=40)
-@given(random_runs(), st.sampled_from([-8.0, -1.0, 0.125, 4.0]), st.sampled_from([-4.0, 0.5]))
-def test_scaling_x_or_u_scales_what_has_its_unit_and_leaves_times_and_percentages(trace, c, k):
-    if not np.any(trace.x[0] - trace.r[0]) and not np.any(np.ptp(trace.r, axis=0)):
-        return  # the scale is then 1 by convention
-    before = m.score(trace)
-    after = m.score(
-        dataclasses.replace(
-            trace,
-            x=c * trace.x,
-            r=c * trace.r,
-            u=k * trace.u,
-        )
-    )
-    for metric in m.metrics():
-        power, of_u = (
-            2 if f"({unit})^2" in metric.unit else int(unit in metric.unit)
-            for unit in ("{x}", "{u}")
-        )
-        if metric.name in before:
-            factor = abs(c) ** power * abs(k) ** of_u
-            value = pytest.approx(
-                factor * before[metric.name],
-                rel=1e-12,
-                abs=1e-12,
-                nan_ok=True,
-            )
-            assert after[metric.name] == value, metric.name
-
-
-@pytest.mark.slow
-@settings(max_examples=40)
-@given(random_runs(), st.randoms(use_true_random=False))
-def test_permuting_channels_changes_nothing(trace, random):
-    order = list(range(trace.x.shape[1]))
-    random.shuffle(order)
-    shuffled = {}
-    for name in ("x", "v", "u", "applied", "s", "d", "r", "reaction"):
-        shuffled[name] = getattr(trace, name)[:, order]
-    assert m.score(dataclasses.replace(trace, **shuffled)) == pytest.approx(
-        m.score(trace), rel=1e-12, nan_ok=True
-    )
-
-
-@pytest.mark.slow
-@settings(max_examples=40)
-@given(random_runs(), WHOLE, WHOLE)
-def test_moving_the_origin_of_x_or_t_changes_only_the_peak(trace, shift, start):
-    moved = dataclasses.replace(
-        trace,
-        t=trace.t + start,
-        x=trace.x + shift,
-        r=trace.r + shift,
-    )
-    before = m.score(trace)
-    after = m.score(moved)
-    del before["peak"], after["peak"]
-    assert after == pytest.approx(before, rel=1e-12, nan_ok=True)
-
-
 @settings(max_examples=40)
 @given(random_runs())
 def test_metrics_respect_their_orders(trace):

@@ -89,16 +89,6 @@ def test_rows_of_siconos_are_reproduced(which, rows):
         np.testing.assert_allclose((trace.v[k, 0], trace.u[k, 0]), row, rtol=0, atol=EXACT)
 
 
-def test_only_the_explicit_law_chatters_as_in_siconos():
-    implicit, explicit = first_example()
-    late = implicit.t > 0.5
-    turns = []
-    for trace in (implicit, explicit):
-        turns.append(np.abs(np.diff(trace.u[late, 0])).sum())
-    assert turns[1] > 10.0 * turns[0]
-    assert np.abs(implicit.v[late]).max() < 0.5 * np.abs(explicit.v[late]).max()
-
-
 # twisting
 
 
@@ -141,13 +131,3 @@ def test_rows_of_siconos_implicit_twisting_are_reproduced():
     for t, row in TWISTING.items():
         k = round(t / 0.1)
         np.testing.assert_allclose((trace.x[k, 0], trace.v[k, 0]), row, rtol=0, atol=EXACT)
-
-
-def test_the_library_s_twisting_is_another_scheme_and_chatters():
-    """It takes the signs at the start of the period: it ends in a cycle, not at rest."""
-    implicit, explicit = twisting_runs()
-    late = implicit.t > 15.0
-    assert np.abs(implicit.x[late]).max() < 1e-12
-    assert np.abs(np.diff(implicit.u[late], axis=0)).max() < 1e-9
-    assert np.abs(explicit.x[late]).max() > 13.0 * 0.1**2
-    assert np.abs(np.diff(explicit.u[late], axis=0)).max() >= 2.0 * 3.0

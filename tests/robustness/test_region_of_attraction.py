@@ -148,21 +148,6 @@ def test_a_run_that_leaves_slowly_does_not_converge_early():
     assert (basin.outcome[1] != CONVERGES).all()
 
 
-@pytest.mark.slow
-def test_distance_is_measured_from_the_reference(refused):
-    held = dataclasses.replace(
-        base("duffing", smc.law("lqr"), 12.0), model="nominal", reference=smc.Constant(0.3)
-    )
-    basin = maps.basin_of(held, [0.0, 0.6], [0.0, 0.1])
-    assert basin.outcome.tolist() == [[CONVERGES] * 2] * 2
-    assert basin.decided_at.max() < 5.0
-    refused(
-        lambda: maps.basin_of(
-            dataclasses.replace(held, reference=smc.Sine(0.3, 1.0)), [0.0, 0.6], [0.0, 0.1]
-        )
-    )
-
-
 def test_rest_a_turn_away_does_not_converge_and_the_way_back_from_there_takes_time():
     basin = maps.basin_of(
         base("inverted_pendulum", counts_no_turns, 3.0), [0.0, 2 * math.pi], [0.0]

@@ -47,16 +47,6 @@ def shortened(s, duration):
     return dataclasses.replace(s, duration=duration, **changes)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("plant", smc.paper.GAINS)
-def test_callback_equals_plain_loop_under_every_law_of_the_study_in_every_condition(plant):
-    scenarios = []
-    for law in STUDIED:
-        for condition in smc.paper.CONDITIONS:
-            scenarios.append(shortened(smc.paper.scenario(plant, law, condition, seed=7), 0.05))
-    assert_loops_agree(scenarios)
-
-
 def test_callback_equals_plain_loop_under_every_law():
     """To rounding, as compiled powers and compiled models may differ from Python's by one."""
     ways = itertools.cycle(itertools.product(("none", "nominal"), ("measured", "levant")))
@@ -69,14 +59,6 @@ def test_callback_equals_plain_loop_under_every_law():
         model, velocity = next(ways)
         scenarios.append(noisy(plants[i % len(plants)], law, model, velocity))
     assert_loops_agree(scenarios, 1e-9)
-
-
-@pytest.mark.slow
-@PLANTS
-def test_callback_equals_plain_loop_under_every_law_of_a_plant(plant):
-    """The whole product, of which the test above has a part."""
-    ways = itertools.product(smc.laws(plant), ("none", "nominal"), ("measured", "levant"))
-    assert_loops_agree([noisy(plant, *way) for way in ways], 1e-9)
 
 
 def noisy(plant, law, model, velocity):

@@ -4,14 +4,11 @@ import itertools
 
 import numpy as np
 import pytest
-from helpers.films import staged, tracks
+from helpers.films import tracks
 
 import smc_mujoco as smc
-from smc_mujoco.common import gl
 from smc_mujoco.draw.film import camera, puppet, track, viewpoint
 
-SIZE = (640, 230)
-renders = pytest.mark.skipif(gl.missing() is not None, reason=str(gl.missing()))
 MODEL = """
 <mujoco model="arm">
   <visual><headlight ambient="0.3 0.2 0.1"/></visual>
@@ -67,17 +64,6 @@ def test_an_own_model_s_camera_is_found_by_its_name(trace):
     assert down == pytest.approx(np.sin(np.radians(viewpoint.LOWEST)))  # looks along the floor
     with pytest.raises(smc.ScenarioError, match="sid"):
         own.turn("sid")
-
-
-@pytest.mark.slow
-@renders
-def test_links_without_a_colour_have_the_law_s_and_other_bodies_their_own(trace):
-    with staged(trace, SIZE) as stage:
-        (link,) = stage.links
-        ball = next(i for i in range(stage.model.ngeom) if stage.model.geom_rgba[i, 1] > 0.8)
-        # blue, not MuJoCo's grey
-        assert stage.model.geom_rgba[link, 2] > 2 * stage.model.geom_rgba[link, 0]
-        assert stage.model.geom_rgba[ball, :3] == pytest.approx([0.2, 0.9, 0.2])
 
 
 def test_joints_without_a_channel_move_as_in_the_run(trace):

@@ -3,7 +3,6 @@ known signals.
 """
 
 import csv
-import dataclasses
 import math
 from pathlib import Path
 from types import SimpleNamespace
@@ -270,21 +269,3 @@ def test_laws_are_in_the_machines_order_or_not(medians, fell, expected):
         by_law[law] = [run] * 3
         assert len(reported.standing([run], "alpha_rms")) == (law not in fell)
     assert reported.ordered({"set 1": by_law}) == (expected[0], pytest.approx(expected[1]))
-
-
-@pytest.mark.slow
-def test_the_plain_twin_has_the_machines_order_reversed(monkeypatch):
-    rig = dataclasses.replace(smc.rig("stepper_furuta"), ensemble=())
-    monkeypatch.setitem(reported.CONDITIONS, "hold", {"duration": 22.0})
-    plain = reported.predicted(rig, "hold", 1, reported.PLAIN)
-    assert reported.ordered(plain) == (0, -1.0)
-    alone = {}
-    for law, runs in plain["set 1"].items():
-        alone[law] = reported.standing(runs, "alpha_rms")
-    assert alone["linear"] > 100.0 * max(alone["two_states"], alone["four_states"])
-    predictions = reported.predicted(rig, "hold", 2)["set 1"]
-    assert {law: len(runs) for law, runs in predictions.items()} == dict.fromkeys(reported.ORDER, 2)
-    assert (
-        reported.standing(predictions["two_states"], "alpha_rms").min()
-        > 100.0 * alone["two_states"]
-    )

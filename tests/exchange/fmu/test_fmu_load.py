@@ -56,27 +56,6 @@ def scenario(law, plant="duffing", **more) -> smc.Scenario:
     return smc.Scenario(plant=plant, law=law, **common | more)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("plant", "law", "more"),
-    [
-        ("duffing", "super_twisting", {"surface": "integral", "velocity": "levant"}),
-        ("pendulum_network", "pid", {}),  # an instance for each channel
-        ("cart_pole", "hierarchical", {}),  # which reads a second joint
-        ("duffing", "computed_torque", {"model": "nominal"}),
-    ],
-)
-def test_an_exported_law_comes_back_with_the_same_bits(folder, plant, law, more):
-    ours = scenario(law, plant, **more)
-    path = smc.exchange.law_to_fmu(ours, folder / f"{plant}-{law}.fmu")
-    theirs = smc.exchange.law_from_fmu(path, name="theirs")()
-    first = smc.run(ours)
-    second = smc.run(scenario(theirs, plant, **{k: v for k, v in more.items() if k == "model"}))
-    assert second.failure is None
-    for field in ("x", "v", "u", "s"):
-        np.testing.assert_array_equal(getattr(second, field), getattr(first, field))
-
-
 def test_samples_that_are_late_or_missed_are_steps_that_follow_each_other(folder, foreign):
     """The law's state waits for a missed sample, and an FMU of a longer period for the first sample
     that is due.

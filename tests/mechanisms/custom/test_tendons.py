@@ -7,7 +7,6 @@ import warnings
 
 import numpy as np
 import pytest
-from scipy.optimize import lsq_linear
 
 import smc_mujoco as smc
 from smc_mujoco.analysis.engine.scored_runs import ScoredRuns
@@ -89,21 +88,6 @@ def test_a_least_tension_pulls_at_both_sides():
     assert tensions(trace)[:, 0].min() == 5.0
     torque = (arms_at(trace.x[:, 0]) * tensions(trace)).sum(axis=1)
     np.testing.assert_allclose(torque, trace.applied[:, 0], atol=1e-8)
-
-
-def test_three_tendons_over_two_joints_are_a_bounded_least_squares():
-    plant = smc.plant_from(THREE, ["j1", "j2"], name="three")
-    trace = run_of(plant)
-    assert tensions(trace).shape == (len(trace.t), 3)
-    assert tensions(trace).min() == 0.0
-    ridge = RIDGE * (ARMS**2).sum(axis=0).max()
-    for k in range(0, len(trace.t), 97):
-        torques = trace.applied[k]
-        system = np.vstack([ARMS, np.sqrt(ridge) * np.eye(3)])
-        own = lsq_linear(system, [*torques, 0.0, 0.0, 0.0], bounds=(0.0, 90.0), tol=1e-14)
-        np.testing.assert_allclose(ARMS @ tensions(trace)[k], ARMS @ own.x, atol=1e-6)
-        # of the tensions that give this force, the least
-        assert np.linalg.norm(tensions(trace)[k]) <= np.linalg.norm(own.x) + 1e-4
 
 
 def test_shared_forces_are_optimal_for_arms_at_random():
