@@ -157,6 +157,19 @@ def test_what_is_not_known_is_left_out():
     assert "after 7 searches" in said(Fact("best", **best, searches=7))[1]
 
 
+def test_a_fact_without_a_value_that_its_text_needs_is_not_said():
+    facts = [
+        Fact("never", where=["sine"]),
+        Fact("never", where=[]),
+        Fact("late", delay=math.nan),
+        Fact("without", runs=None, below=None),
+    ]
+    screen = Screen(notes=[Fact("gains are", gains="")], facts=facts)
+    assert answers.screen_lines(screen)[-1] == "beware  no law settles under sine"
+    assert len(answers.lines_of(screen.facts)) == 1
+    assert "<p>" not in answers.screen_html(screen)
+
+
 def test_facts_without_room_on_a_screen_are_counted_and_commands_stay():
     doubts = [Fact("doubt", text=f"number {i}") for i in range(30)]
     lines = answers.screen_lines(Screen(facts=doubts, next=NextStep("smc-mujoco list", "lists")))

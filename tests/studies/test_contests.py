@@ -11,7 +11,7 @@ from helpers.tables import MadeTable
 from smc_mujoco.analysis.tuning import result
 from smc_mujoco.answers import answers
 from smc_mujoco.answers.explain import explain
-from smc_mujoco.answers.facts import Lead, NextStep, Screen, Settles, Trails
+from smc_mujoco.answers.facts import Lead, NextStep, Open, Screen, Settles, Trails
 from smc_mujoco.answers.templates import TEXTS, said
 from smc_mujoco.metrics.catalogue import CATALOGUE
 from smc_mujoco.robustness import sensitivity, worst_case
@@ -164,6 +164,10 @@ def test_a_law_with_a_run_that_does_not_arrive_is_not_to_be_used(boards):
     lost = dataclasses.replace(block, away=(LAWS[-1],))
     (contest,) = contests([*first, dataclasses.replace(last, blocks=(lost,))], OWN, ())
     assert contest.use is None
+    elsewhere = dataclasses.replace(block, away=(LAWS[0],))
+    (contest,) = contests([*first, dataclasses.replace(last, blocks=(elsewhere,))], OWN, ())
+    assert contest.use
+    assert (contest.use.values["law"], contest.use.values["unless"]) == (LAWS[-1], [])
 
 
 def test_more_than_five_plants_and_conditions_are_one_table_of_winners():
@@ -178,6 +182,24 @@ def test_more_than_five_plants_and_conditions_are_one_table_of_winners():
     for block in blocks:
         assert len(re.findall(rf"^{block.plant} +{block.condition} ", "\n".join(lines), re.M)) == 1
     assert text.count("my_law") == 6
+
+
+def test_of_many_contests_J_is_said_once_for_each_plant_with_the_law_to_use():
+    conditions = ("friction", "noise", "encoder", "sine", "lag", "delay")
+    boards = leaderboard(table(conditions), ["itae"], by=("plant", "condition"))
+    (J,) = leaderboard(table(("all",)), ["itae"], by=("plant",))
+    J = dataclasses.replace(J, metric="objective", unit="s^2")
+    won = dataclasses.replace(J.blocks[0].verdict, metric="J")
+    even = Open(metric="J", laws=LAWS[:2], hidden=0.1)
+    for verdict, said_of in ((won, [LAWS[0], f"below {LAWS[1]}"]), (even, ["Undecided", LAWS[0]])):
+        block = dataclasses.replace(J.blocks[0], verdict=verdict)
+        of_plant = dataclasses.replace(J, blocks=(block,))
+        (part,) = answers.blocks(Screen(contests=contests([of_plant, *boards], OWN, ())))
+        assert part.tables[0].headings == ["", "", "ITAE"]
+        ((plant, text),) = part.pairs
+        assert plant == "duffing"
+        assert [word for word in said_of if word not in text] == []
+        assert "might not show" not in text
 
 
 @pytest.mark.parametrize(
