@@ -28,8 +28,8 @@ from matplotlib.ticker import NullLocator
 
 from smc_mujoco.common.errors import find
 from smc_mujoco.common.files import read_json
+from smc_mujoco.draw import colouring, style
 from smc_mujoco.draw import page as pages
-from smc_mujoco.draw import style
 from smc_mujoco.identification.published_rig import catalogue
 
 FILE = Path(__file__).with_suffix(".json")
@@ -224,7 +224,7 @@ def twins_page(rows: Sequence[TwinFigure]) -> Figure:
     """
     placed_rows = laid_out(rows)
     rigs = list(dict.fromkeys(row.figures[0].rig for row in placed_rows))
-    colours = dict(zip(rigs, style.spread(len(rigs)), strict=True))
+    colours = dict(zip(rigs, colouring.spread(len(rigs)), strict=True))
     with style.page(WIDTH):
         handles = [
             pages.entry("twin, with its range", style.INK, lw=1.0, marker="o", ms=3.5),

@@ -28,7 +28,7 @@ from smc_mujoco.control.law import Measurement, law
 from smc_mujoco.control.law import catalogue as laws
 from smc_mujoco.control.properties import PROPERTIES, reads, searched
 from smc_mujoco.control.surface import catalogue as surfaces
-from smc_mujoco.draw import style
+from smc_mujoco.draw import wording
 from smc_mujoco.exchange.c.export_c import law_to_c
 from smc_mujoco.mechanisms.plant import Plant, model_path
 from smc_mujoco.mechanisms.plant import catalogue as plants
@@ -76,7 +76,7 @@ def pages() -> dict[str, dict[str, list[Page]]]:
     drawn = figures.figures(drawings)
     grouped = {}
     for family, names in families().items():
-        grouped[style.in_words(family)] = [_law_page(laws()[name], drawn) for name in names]
+        grouped[wording.in_words(family)] = [_law_page(laws()[name], drawn) for name in names]
     return {
         "Plants": {"": [_plant_page(plant, drawn) for plant in plants().values()]},
         "Laws": grouped,
@@ -138,7 +138,7 @@ def _law_page(template: Template, drawn: Mapping[tuple[str, ...], bytes]) -> Pag
     ]
     return Page(
         f"laws/{name}",
-        style.law_name(name),
+        wording.law_name(name),
         _front(name, parts.formula) + "\n\n".join(filter(None, text)) + "\n",
     )
 
@@ -160,7 +160,7 @@ def _front(name: str, description: str) -> str:
     search.
     """
     words = f"description: {description!r}\n" * ("'" not in description)
-    return f"---\ntags: [{style.law_name(name)!r}]\n{words}---\n\n"
+    return f"---\ntags: [{wording.law_name(name)!r}]\n{words}---\n\n"
 
 
 def _link_up(plant: str) -> str:
@@ -395,7 +395,7 @@ def _listing(title: str, intro: str, templates: Mapping[str, Template]) -> str:
             formula = parsed.formula
         else:
             formula = _display(parsed.formula, template.gains)
-        title = parsed.title or style.in_words(name)
+        title = parsed.title or wording.in_words(name)
         short = re.split(" of |, | \\(", title)[0]
         parts += [f"## {short}", f"`{name}`" + f": {title}" * (title != short), formula]
         parts += [_gain_table(template).removeprefix("## Gains\n\n").partition("\n\n")[0]]
@@ -416,7 +416,7 @@ def _plant_page(plant: Plant, drawn: Mapping[tuple[str, ...], bytes]) -> Page:
     laws_shown = figures.plant_laws(name)
     labels = figures.page_colours(laws_shown)
     key = "".join(
-        f'<span style="--key: {colour}">{style.law_name(law)}</span>'
+        f'<span style="--key: {colour}">{wording.law_name(law)}</span>'
         for law, colour in zip(laws_shown, labels, strict=True)
     )
     picture = f'![{title}]({name}.webp){{ loading=lazy width="1280" height="720" }}' * bool(
@@ -461,7 +461,7 @@ def _plant_page(plant: Plant, drawn: Mapping[tuple[str, ...], bytes]) -> Page:
 
 
 def _label(plant: Plant) -> str:
-    return plant.label or style.in_words(plant.name)
+    return plant.label or wording.in_words(plant.name)
 
 
 def _change(plant: Plant) -> str:

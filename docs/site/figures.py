@@ -65,10 +65,10 @@ def plant_figure(plant: str) -> bytes:
 
 def page_colours(laws: Sequence) -> list[str]:
     """Return the colours of laws, those that are dark so light that they are seen on slate, too."""
-    from smc_mujoco.draw import dark, style
+    from smc_mujoco.draw import colouring, dark, style
 
     slate = {style.PAPER: SLATE, style.INK: style.PAPER}
-    return [dark.on_dark(colour, slate) for colour in style.law_colours(laws)]
+    return [dark.on_dark(colour, slate) for colour in colouring.law_colours(laws)]
 
 
 def still(plant: str) -> bytes:

@@ -13,7 +13,7 @@ import catalogue
 
 import smc_mujoco as smc
 from smc_mujoco.control.law import joint_catalogue as joint_laws
-from smc_mujoco.draw import style
+from smc_mujoco.draw import wording
 from smc_mujoco.evidence.audit.paper import paper
 from smc_mujoco.evidence.audit.verdict import DERIVED, MARKS, OURS, PAPER, VERDICTS, WHOSE_WORDS
 from smc_mujoco.mechanisms.plant import catalogue as plants
@@ -128,7 +128,7 @@ def kinds() -> Iterator[str]:
     """Yield a table of the laws by family."""
     yield "| family | laws |\n|---|---|"
     for family, names in (catalogue.families() | {"many joints": list(joint_laws())}).items():
-        yield _row(style.in_words(family), ", ".join(f"`{name}`" for name in names))
+        yield _row(wording.in_words(family), ", ".join(f"`{name}`" for name in names))
 
 
 def definitions() -> Iterator[str]:

@@ -19,8 +19,8 @@ from matplotlib.figure import Figure
 from smc_mujoco.analysis.step_halving import step_halving
 from smc_mujoco.chattering.prediction import predict
 from smc_mujoco.common.aliases import AnyPath, Fields
+from smc_mujoco.draw import colouring, style, wording
 from smc_mujoco.draw import page as pages
-from smc_mujoco.draw import style
 from smc_mujoco.draw.panels import number_decades
 from smc_mujoco.metrics.limit_cycle import channel_cycle
 from smc_mujoco.simulation.scenario import Scenario
@@ -60,7 +60,7 @@ def mark_crossover(ax: Axes, equal: float) -> None:
         return
     dashes = (0, (4, 3))
     ax.axvline(equal, color=style.RULE, lw=style.points(1.0), ls=dashes)
-    words = f"equal at {style.short(equal)} ms"
+    words = f"equal at {wording.short(equal)} ms"
     place = (equal, 0.0), (-4, 4), ("data", "axes fraction"), "offset points"
     ax.annotate(words, *place, ha="right", va="bottom")
 
@@ -94,13 +94,13 @@ def amplitudes(
         page = pages.blank(style.FULL_WIDTH, PAGE_HEIGHT)
         ax = page.subplots()
         ax.set(xscale="log", yscale="log")
-        colours = style.law_colours(laws)
+        colours = colouring.law_colours(laws)
         rows = zip(runs.items(), colours, gains, strict=True)
         for (label, law_traces), colour, source in rows:
             over_lag = amplitudes_of(law_traces)
             drawn.append(over_lag)
             draw_law(ax, law_traces, over_lag, colour)
-            words = f"{style.label(label)}{source}"
+            words = f"{wording.label(label)}{source}"
             if not over_lag.cycles:
                 words += ": no limit cycle"
             handles.append(pages.entry(words, colour))

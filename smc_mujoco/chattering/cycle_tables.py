@@ -8,7 +8,7 @@ from smc_mujoco.chattering.prediction import Chattering
 from smc_mujoco.common.aliases import Fields, Pair
 from smc_mujoco.common.tabular import Cell, Tabular
 from smc_mujoco.common.text import number
-from smc_mujoco.draw import style
+from smc_mujoco.draw import colouring
 from smc_mujoco.simulation.scenario import Scenario
 
 
@@ -31,7 +31,7 @@ def table(
     for scenario, cycle, (amplitude, frequency), change in zip(
         scenarios, cycles, measured, changes, strict=True
     ):
-        law = Cell(scenario.law.name, colour=style.law_colour(scenario.law.name))
+        law = Cell(scenario.law.name, colour=colouring.law_colour(scenario.law.name))
         mark = MARK if change.marked else ""
         sizes = number(cycle.amplitude), number(amplitude) + mark
         rates = number(cycle.frequency), number(frequency) + mark

@@ -19,8 +19,8 @@ from matplotlib.figure import Figure
 from smc_mujoco.analysis.step_halving import NOTE, StepChange
 from smc_mujoco.chattering.harmonics import Loop
 from smc_mujoco.chattering.prediction import Chattering
+from smc_mujoco.draw import colouring, lettering, shared_axes, style, wording
 from smc_mujoco.draw import page as pages
-from smc_mujoco.draw import style
 from smc_mujoco.draw.page import Handle
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
@@ -54,7 +54,7 @@ def nyquist(
       path: as in `figure`.
     """
     with style.page():
-        colours = style.law_colours([scenario.law for scenario in scenarios])
+        colours = colouring.law_colours([scenario.law for scenario in scenarios])
         sources = [[scenario.law.source] for scenario in scenarios]
         gains, shared = pages.gain_sources(sources)
         handles: list[Handle] = []
@@ -62,7 +62,7 @@ def nyquist(
             words = "no limit cycle predicted, L and 1/N do not cross"
             if cycle:
                 words = f"{cycle.frequency:.3g} Hz predicted"
-            label = f"{style.law_name(scenario.law)}: {words}{source}"
+            label = f"{wording.law_name(scenario.law)}: {words}{source}"
             handles.append(pages.entry(label, colour))
         if any(cycles):
             wide = style.points(WIDE)
@@ -87,9 +87,9 @@ def nyquist(
             last_periods(right, trace, cycle, channel, colour)
             if change.marked:
                 room = 72 * 0.53 * style.FULL_WIDTH
-                words = style.wrapped(NOTE, room, size, lines=2)
+                words = lettering.wrapped(NOTE, room, size, lines=2)
                 right.set_title(words, loc="left", fontsize=size, fontweight="normal")
-        title = f"Chattering: {style.head(scenarios)}"
+        title = f"Chattering: {wording.head(scenarios)}"
         pages.set_head(page, style.FULL_WIDTH, title, handles, shared)
         return pages.write(page, pages.files(path))
 
@@ -139,7 +139,7 @@ def last_periods(ax: Axes, trace: Trace, cycle: Chattering, channel: int, colour
     s = trace.s[part, channel]
     unit = f"{trace.scenario.plant.units[channel]}/s"
     largest = float(np.abs(s).max())
-    factor, unit = style.prefixed(largest, unit)
+    factor, unit = shared_axes.prefixed(largest, unit)
     s = factor * s
     t = trace.t[part] - trace.t[part][0]
     if cycle:
@@ -152,13 +152,13 @@ def last_periods(ax: Axes, trace: Trace, cycle: Chattering, channel: int, colour
         ax.axhspan(mean - amplitude, mean + amplitude, color=colour, alpha=0.15, lw=0)
         low, high = ax.get_ylim()
         ax.set_ylim(low, high + 0.18 * (high - low))
-        words = f"band: ±{style.short(amplitude)} {unit}, predicted"
+        words = f"band: ±{wording.short(amplitude)} {unit}, predicted"
         if cycle.uncertainty > 1.0:
             words += "; irregular"
         if cycle.threshold_x:
             unstable = cycle.threshold_x * amplitude / cycle.amplitude_x
             for level in (mean - unstable, mean + unstable):
                 ax.axhline(level, color=colour, lw=style.points(1.2), ls="dotted")
-            words += f"; dotted: about ±{style.short(unstable)}, unstable, within it a run rests"
+            words += f"; dotted: about ±{wording.short(unstable)}, unstable, within it a run rests"
         place = {"transform": ax.transAxes, "ha": "right", "va": "top"}
         ax.text(0.99, 0.97, words, fontsize=style.points(9.5), **place)

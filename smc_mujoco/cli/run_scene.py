@@ -12,7 +12,7 @@ from smc_mujoco.cli.console import Terminal
 from smc_mujoco.common import annexes, gl
 from smc_mujoco.common.errors import ScenarioError, printable
 from smc_mujoco.common.files import slug
-from smc_mujoco.draw import style
+from smc_mujoco.draw import wording
 from smc_mujoco.draw.film.camera import Camera
 from smc_mujoco.simulation.run import run
 from smc_mujoco.simulation.scenario import Scenario
@@ -62,7 +62,7 @@ def perform(
             path = out / f"{slug(scene.film)}.mp4"
             title = _title(scene, scene.film)
             runs = [*traces[scene.film].values()]
-            names = [*map(style.label, traces[scene.film])]
+            names = [*map(wording.label, traces[scene.film])]
             written += filmed(runs, path, names, title, terminal, scene.camera)
     finally:  # also if the film fails or is stopped
         terminal.print("wrote", style="dim")
@@ -72,7 +72,7 @@ def perform(
 
 def _title(scene: Scene, condition: str) -> str:
     if len(scene.conditions) > 1:
-        return style.under(scene.title, condition)
+        return wording.under(scene.title, condition)
     return scene.title
 
 
@@ -127,7 +127,7 @@ def figures(scene: Scene, traces: Traces, out: Path) -> list[Path]:
     written: list[Path] = []
     for condition, runs in traces.items():
         path = out / f"{slug(condition)}.svg"
-        names = list(map(style.label, runs))
+        names = list(map(wording.label, runs))
         title = _title(scene, condition)
         figure(list(runs.values()), path, labels=names, title=title, panels=panels)
         written += files(path)

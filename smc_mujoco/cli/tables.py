@@ -21,7 +21,7 @@ from smc_mujoco.common.registry import Catalogue
 from smc_mujoco.common.tabular import Cell, Tables, Tabular, as_cell
 from smc_mujoco.common.text import first_paragraph, number
 from smc_mujoco.control.source import in_words
-from smc_mujoco.draw import style
+from smc_mujoco.draw import colouring, shared_axes
 from smc_mujoco.mechanisms.layout import channel_names
 from smc_mujoco.metrics.catalogue import metrics
 from smc_mujoco.metrics.catalogue import scores as metric_scores
@@ -73,7 +73,7 @@ def scores(title: str, traces: Mapping[str, Trace], again: Again | None = None) 
     Scores that differ from those of the same runs `again` are marked, with the smallest and the
     largest value.
     """
-    style.traces_of_one_plant(list(traces.values()))
+    shared_axes.traces_of_one_plant(list(traces.values()))
     scenario = next(iter(traces.values())).scenario
     runs = _repeated(traces, again)
     scored = functools.cache(metric_scores)
@@ -154,7 +154,7 @@ def _table(title: str, columns: Sequence[ScoreColumn], traces: Mapping[str, Trac
     head = "run" if len(laws) == 1 < len(traces) else "law"
     rows = []
     for label, trace in traces.items():
-        name = Cell(label, colour=style.law_colour(trace.scenario.law.name))
+        name = Cell(label, colour=colouring.law_colour(trace.scenario.law.name))
         rows.append([name, *(_cell(column, label) for column in columns)])
     heads = [head, *(column.heading for column in columns)]
     return Tabular(headings=heads, rows=rows, title=title)

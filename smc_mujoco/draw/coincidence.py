@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 
 from smc_mujoco.common.aliases import Fields, Pair
 from smc_mujoco.common.text import joined
-from smc_mujoco.draw import style
+from smc_mujoco.draw import lettering, style
 
 MIN_WORDS = 4.0  # least height of a panel that has room for words, in heights of letters
 # of a panel's height, below the width of a line: curves no farther apart agree
@@ -98,7 +98,7 @@ def tell_agreements(
     forever = [agreement for agreement in shared if agreement[1] == np.inf]
     for which in (shared, forever):
         said = "; ".join(filter(None, (agreement_words(which, names), also)))
-        words = style.wrapped(said, room, size, 2)
+        words = lettering.wrapped(said, room, size, 2)
         lines = 1 + words.count("\n")
         if words and "…" not in words and height >= MIN_WORDS * size * lines:
             break

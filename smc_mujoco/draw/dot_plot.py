@@ -29,9 +29,9 @@ from smc_mujoco.analysis.ranking import linked
 from smc_mujoco.common.aliases import AnyPath, Array, Fields
 from smc_mujoco.common.errors import ScenarioError, items_of, shown, unknown, warn_once
 from smc_mujoco.common.text import number
+from smc_mujoco.draw import colouring, style, wording
 from smc_mujoco.draw import page as pages
 from smc_mujoco.draw import panels as drawing
-from smc_mujoco.draw import style
 from smc_mujoco.draw.page import Handle, Size
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.metrics.catalogue import CATALOGUE
@@ -93,7 +93,7 @@ def plot(
     paths = pages.files(path, format)
     width, height = pages.measure(size, fig)
     dots = _dots(table, items_of("metrics", metrics), winners or (), objectives or {})
-    head = style.titled(title, f"Medians: {dots.heading}")
+    head = wording.titled(title, f"Medians: {dots.heading}")
     with style.page(width):
         key, shared = _key(table, dots)
         if winners is not None and not dots.won:
@@ -142,7 +142,7 @@ def room_for_metrics(width: float, laws: int, conditions: Sequence[int]) -> int:
 def _name_row(ax: Axes, plant: Plant | str, high: float) -> None:
     """Write the name of a plant above its row, which is `high` in, clear of the note above it."""
     above = 1.0 + 1.7 * pages.TEXT_SIZE / 72 / (high - WORDS_HEIGHT)
-    ax.set_title(style.plant_name(plant), y=above, parse_math=False)
+    ax.set_title(wording.plant_name(plant), y=above, parse_math=False)
 
 
 class Dots(NamedTuple):
@@ -214,7 +214,7 @@ def _dots(
     for name in metrics:
         if _differs_much(intervals, name):
             logarithmic.add(name)
-    heading = style.heading([*plant_labels.values()], conditions, short=len(plants) > 1)
+    heading = wording.heading([*plant_labels.values()], conditions, short=len(plants) > 1)
     return Dots(
         metrics=list(metrics),
         conditions=conditions_of,
@@ -263,8 +263,8 @@ def _looks(laws: Sequence[str], named: Mapping[str, str]) -> dict[str, Fields]:
     """Return law -> its label, and the colour and the mark of its dots."""
     looks = {}
     marks = itertools.cycle(style.MARKS)
-    for law, colour in zip(laws, style.law_colours(laws), strict=True):
-        label = named.get(law) or style.law_name(law)
+    for law, colour in zip(laws, colouring.law_colours(laws), strict=True):
+        label = named.get(law) or wording.law_name(law)
         looks[law] = {"label": label, "color": colour, "marker": next(marks), "mec": "none"}
     return looks
 
@@ -401,7 +401,7 @@ def _panel(
     else:
         places = np.arange(len(conditions))
         middles = height * (places + 0.5) - 1
-        ax.set_yticks(middles, list(map(style.condition_name, conditions)), parse_math=False)
+        ax.set_yticks(middles, list(map(wording.condition_name, conditions)), parse_math=False)
     ax.set_ylim(len(conditions) * height - 1, -1)
     ax.grid(visible=False, axis="y")
     ax.tick_params(axis="y", length=0)

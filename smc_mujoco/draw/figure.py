@@ -14,7 +14,18 @@ from matplotlib.ticker import MaxNLocator
 from smc_mujoco.common.aliases import AnyPath, Pair
 from smc_mujoco.common.errors import ScenarioError, find, items_of
 from smc_mujoco.control.source import by_words
-from smc_mujoco.draw import dark, horizon, lanes, quantities, style
+from smc_mujoco.draw import (
+    colouring,
+    dark,
+    horizon,
+    lanes,
+    lettering,
+    quantities,
+    shared_axes,
+    style,
+    timed_events,
+    wording,
+)
 from smc_mujoco.draw import page as pages
 from smc_mujoco.draw import panels as drawing
 from smc_mujoco.draw.decimate import end, finite, window
@@ -64,15 +75,15 @@ class DrawnRuns(NamedTuple):
     colours: Sequence[str]
     head: str  # what they are of
     gains: str  # where these come from
-    events: Sequence[style.Event]
+    events: Sequence[timed_events.Event]
     marks: Mapping[float, str]  # what happens by its time, s
     span: Pair
 
     @classmethod
     def of(cls, traces: Trace | Sequence[Trace], labels: Sequence[str] | None) -> "DrawnRuns":
         """Return traces of one plant, up to where they are finite, as they are drawn."""
-        traces = style.traces_of_one_plant(traces)
-        names = style.labels(traces, labels)
+        traces = shared_axes.traces_of_one_plant(traces)
+        names = wording.labels(traces, labels)
         scenarios = [trace.scenario for trace in traces]
         sources = [scenario.law.source for scenario in scenarios]
         entries = names
@@ -81,16 +92,16 @@ class DrawnRuns(NamedTuple):
             entries = list(map(operator.add, names, behind))
         words = [source.words for source in sources]
         finite_traces = list(map(finite, traces))
-        events = style.events(traces, names)
+        events = timed_events.events(traces, names)
         return cls(
             finite_traces,
             names,
             entries,
-            style.trace_colours(traces),
-            style.head(scenarios),
-            by_words(dict(zip(style.numbered(names), words, strict=True))),
+            colouring.trace_colours(traces),
+            wording.head(scenarios),
+            by_words(dict(zip(wording.numbered(names), words, strict=True))),
             events,
-            style.marks(events),
+            timed_events.marks(events),
             (horizon.horizon(finite_traces), end(finite_traces)),
         )
 
@@ -200,14 +211,14 @@ def _composed_page(
     """
     width, height = size
     blocks = _blocks(runs, chosen)
-    head = style.titled(title, runs.head)
+    head = wording.titled(title, runs.head)
     handles = pages.run_handles(runs.traces, runs.entries, runs.colours)
     key = _key([*blocks.left_panels, *blocks.right], runs.events)
     if blocks.left_out:
         entry = pages.entry(blocks.left_out, lw=0)
         key.append(entry)
     gains = runs.gains if runs.entries == runs.names else ""
-    fits = style.width(gains, style.points(pages.TEXT_SIZE)) <= pages.note_room(width)
+    fits = lettering.width(gains, style.points(pages.TEXT_SIZE)) <= pages.note_room(width)
     if gains and not (head and fits):  # there is no place beside a title
         key.append(pages.entry(runs.gains, lw=0))
         gains = ""
@@ -382,7 +393,7 @@ def _height(panel: Panel) -> float:
 
 def _default(traces: Sequence[Trace], width: float) -> list[str]:
     """Return the names of the panels that suit the plant and the page."""
-    parts = style.split(traces)
+    parts = shared_axes.split(traces)
     many_channels = any(len(group.channels) > 1 for group in parts)
     disturbed = any(np.nan_to_num(trace.d).any() for trace in traces)
     names = ["d"] if disturbed else []
@@ -458,7 +469,7 @@ def _noted(panel: Panel) -> str:
 def _draw_alone(ax: Axes, runs: DrawnRuns, wanted: str, title: str | None) -> None:
     """Draw one panel into a caller's axes, which keep their look."""
     name = find("panel", wanted, PANEL_NAMES)
-    head = style.titled(title, "")
+    head = wording.titled(title, "")
     before = set(ax.findobj())
     blocks = _blocks(runs, [name])
     if blocks.beside:
@@ -523,7 +534,7 @@ def _rows(
     for row, name in zip(rows, runs.names, strict=True):
         sample = pages.entry(".", row.colours[0])
         key = row.axes.legend(handles=[sample], handlelength=1.0, **look)
-        words = style.cropped(name, room, size)
+        words = lettering.cropped(name, room, size)
         key.get_texts()[0].set_text(words)
         key.get_texts()[0].set_parse_math(False)
         key.set_in_layout(False)
@@ -603,7 +614,7 @@ def _end_words(panel: Panel) -> str:
     letter = "control u"
     if plant.driven > 1 or plant.direct:
         letter = f"{channel_names(plant)[0]} u"
-    return style.folded(letter + panel.scale[1])
+    return lettering.folded(letter + panel.scale[1])
 
 
 def _draw_side(ax: Axes, name: str, place: Panel, runs: DrawnRuns) -> None:
@@ -625,7 +636,7 @@ def _draw_side(ax: Axes, name: str, place: Panel, runs: DrawnRuns) -> None:
         ax.set(xlabel=words, ylabel=panel.label, xlim=(0.0, runs.span[1]))
 
 
-def _key(shown: Sequence[Panel], events: Sequence[style.Event]) -> list[Handle]:
+def _key(shown: Sequence[Panel], events: Sequence[timed_events.Event]) -> list[Handle]:
     """Return a legend's entries for the reference, for lines and bands, and for what happens."""
     handles: list[Handle] = []
     thin = style.points(drawing.LIGHT_LINE)

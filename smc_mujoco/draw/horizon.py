@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from smc_mujoco.draw import style
+from smc_mujoco.draw import shared_axes
 from smc_mujoco.draw.decimate import arrays_within, end
 from smc_mujoco.draw.quantities import span
 from smc_mujoco.metrics.conventions import last_exit, scale, settling_band
@@ -25,7 +25,7 @@ def horizon(traces: Sequence[Trace]) -> float:
     """
     duration = end(traces)
     last = 0.0
-    for group, parts in style.split(traces).items():
+    for group, parts in shared_axes.split(traces).items():
         low, high = span(parts, "x")
         for trace in parts:
             ways = trace.x - trace.x[-1]

@@ -9,7 +9,7 @@ from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 
 from smc_mujoco.common.aliases import Array, Fields
-from smc_mujoco.draw import style
+from smc_mujoco.draw import lettering, shared_axes, style, wording
 from smc_mujoco.draw.decimate import band
 from smc_mujoco.draw.panels import (
     MIN_CLOSE_UP,
@@ -81,7 +81,7 @@ def below_film(
     if laned:
         letters = style.points(float(style.RC["font.size"]))
         room = 72 * ax.get_window_extent().width / ax.figure.dpi
-        beside = (style.width("smooth", letters) + 2.0) / room
+        beside = (lettering.width("smooth", letters) + 2.0) / room
         drawn_rows = rows(ax, panel, colours, 1.0 - beside)
         for row in drawn_rows:
             row.axes.set(xlim=ax.get_xlim(), xticks=ax.get_xticks())
@@ -150,7 +150,7 @@ def cut_peak(ax: Axes, panel: Panel) -> None:
     if 0.0 < lasting < peak and not ax.texts:
         air = MARGIN * lasting
         ax.set_ylim(-air, lasting + 2.0 * air)
-        words = f"up to {style.short(peak)} {style.units(panel.group)['u']}"
+        words = f"up to {wording.short(peak)} {shared_axes.units(panel.group)['u']}"
         size = style.points(9.0)
         place: Fields = {"xytext": (-0.5 * size, -0.4 * size), "textcoords": "offset points"}
         look: Fields = {"ha": "right", "va": "top", "fontsize": size, "color": style.INK}
@@ -212,7 +212,7 @@ def tell_swing(lane: Axes, trace: Trace, colour: str, factor: float) -> list[Art
     if trace.diverged_at is not None:
         words = "fails"
     elif swing > SMOOTH_SHARE * (high - low):
-        words = f"±{style.short(factor * swing)}"
+        words = f"±{wording.short(factor * swing)}"
         places = lane.transLimits.transform([(0.0, least), (0.0, most)])
         ends = places[:, 1]
         look: Fields = {"color": colour, "lw": style.points(3), "clip_on": False}

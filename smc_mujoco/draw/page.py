@@ -26,7 +26,7 @@ from smc_mujoco.common.constraints import OneOf
 from smc_mujoco.common.errors import ScenarioError, find, items_of, shown
 from smc_mujoco.common.files import as_path, replacing
 from smc_mujoco.control.source import NONE, Source, kinds
-from smc_mujoco.draw import dark, style
+from smc_mujoco.draw import dark, lettering, style, wording
 from smc_mujoco.simulation.trace import Trace
 
 DPI = 200  # of a PNG of a full page or a slide
@@ -173,9 +173,9 @@ def _legend(handles: Sequence[Handle], width: float) -> tuple[list[str], int]:
         widths = []
         for handle in handles:
             words = str(handle.get_label())
-            label = style.wrapped(words, share * page - beside, size, lines=2)
+            label = lettering.wrapped(words, share * page - beside, size, lines=2)
             labels.append(label)
-            widest = style.widest(label.split("\n"), size)
+            widest = lettering.widest(label.split("\n"), size)
             widths.append(beside + widest)
         for columns in range(len(widths), 1, -1):
             parts = np.array_split(widths, columns)
@@ -203,20 +203,20 @@ def set_head(
     room = 72 * width - 16
     words, columns = _legend(handles, width)
     if note:
-        note = style.cropped(note, note_room(width), size)
-        room -= style.width(note, size) + big
+        note = lettering.cropped(note, note_room(width), size)
+        room -= lettering.width(note, size) + big
         place = {"xytext": (-8, -style.points(TITLE_PAD) - big), "textcoords": "offset points"}
         look = {"fontsize": size, "color": style.MUTED, "ha": "right", "va": "baseline"}
         look |= {"parse_math": False, "annotation_clip": False}
         text = Annotation(note, (1.0, 1.0), xycoords=page.transSubfigure, **place, **look)
         page.add_artist(text).set_in_layout(False)
     if title:
-        wide = style.width(title, big, bold=True)
+        wide = lettering.width(title, big, bold=True)
         big = max(size, min(big, big * room / wide))
     legend = page.legend(
         handles=handles or [Line2D([], [], lw=0)],
         labels=["."] * len(words) or [""],  # matplotlib leaves out labels that begin with _
-        title=style.wrapped(title, room, big, lines=2, bold=True),
+        title=lettering.wrapped(title, room, big, lines=2, bold=True),
         title_fontproperties={"size": big, "weight": "bold"},
         alignment="left",
         loc="outside upper left",
@@ -239,7 +239,7 @@ def run_handles(
     handles: list[Handle] = []
     looks = style.looks(traces)
     for trace, name, colour, look in zip(traces, names, colours, looks, strict=True):
-        how = style.ending(trace)
+        how = wording.ending(trace)
         words = f"{name} ({how})" if how else name
         sample = entry(words, colour, lw=style.points(2.0), **look)
         handles.append(sample)
@@ -346,7 +346,7 @@ def space_ticks(page: Figure | SubFigure) -> None:
         assert isinstance(ax, Axes)
         if isinstance(ax.xaxis.get_major_locator(), MaxNLocator):
             room = 72 * ax.get_window_extent().width / ax.figure.dpi
-            digit = style.width("0" * TICK_LETTERS, size)
+            digit = lettering.width("0" * TICK_LETTERS, size)
             count = int(room / digit)
             most = min(max(count, 1), MAX_TICKS)
             ax.xaxis.set_major_locator(MaxNLocator(most, steps=STEPS))

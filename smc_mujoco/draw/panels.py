@@ -1,10 +1,10 @@
 """Panels of figures and films: a quantity of several traces over time, a phase portrait, the last
 samples of u.
 
-Traces are cut to their finite samples (decimate.finite) and to a group of channels (style.split).
-There is a line for each channel. Where that chatters, it is its mean over a window of time
-(decimate.smooth). The band behind the lines is the range of u, s or a force within a column of
-pixels.
+Traces are cut to their finite samples (decimate.finite) and to a group of channels
+(shared_axes.split). There is a line for each channel. Where that chatters, it is its mean over a
+window of time (decimate.smooth). The band behind the lines is the range of u, s or a force within a
+column of pixels.
 """
 
 import dataclasses
@@ -22,7 +22,7 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from smc_mujoco.common.aliases import Array, ArrayPair, Data, Fields, Pair
 from smc_mujoco.common.text import joined
-from smc_mujoco.draw import style
+from smc_mujoco.draw import lettering, shared_axes, style, wording
 from smc_mujoco.draw.coincidence import Agreement, agreements, tell_agreements
 from smc_mujoco.draw.decimate import COLUMNS, band, end, line, smooth, window
 from smc_mujoco.draw.quantities import (
@@ -116,12 +116,12 @@ class Panel(NamedTuple):
         if self.quantity in ("tip", "tip distance", "contact", "load"):
             return 1.0, ""
         name = QUANTITY_OF_UNIT.get(self.quantity, self.quantity)
-        unit = style.units(self.group)[name]
+        unit = shared_axes.units(self.group)[name]
         if self.quantity in PEAKS:
             return 1.0, f" ({unit})"
         ends = limits(self.traces, self.quantity)
         largest = max(map(abs, ends))
-        factor, prefixed = style.prefixed(largest, unit)
+        factor, prefixed = shared_axes.prefixed(largest, unit)
         if self.quantity != "s" or all(map(slides_on_speed, filter(slides, self.traces))):
             return factor, f" ({prefixed})"
         return factor, "" if factor == 1.0 else f" / {1.0 / factor:g}"
@@ -196,7 +196,7 @@ def is_shared(panel: Panel) -> bool:
 
 def of_groups(traces: Sequence[Trace], quantity: str) -> list[Panel]:
     """Return a panel of the quantity for each group of channels."""
-    return [Panel(quantity, *group_traces) for group_traces in style.split(traces).items()]
+    return [Panel(quantity, *group_traces) for group_traces in shared_axes.split(traces).items()]
 
 
 def over_groups(traces: Sequence[Trace], quantity: str) -> list[Panel]:
@@ -245,7 +245,7 @@ def worst_first(traces: Sequence[Trace]) -> list[Panel]:
     its group.
     """
     sized_panels = []
-    for group, parts in style.split(traces).items():
+    for group, parts in shared_axes.split(traces).items():
         size = max(map(scale, parts))
         for panel in by_channel(Panel("e", group, parts)):
             sized_panels.append((mean_error(panel) / size, panel))
@@ -283,7 +283,7 @@ def actuators(traces: Sequence[Trace]) -> list[Panel]:
     """Return a panel of the force of each actuator of a free body, in their order, of those that
     push at all.
     """
-    groups = style.split(traces).items()
+    groups = shared_axes.split(traces).items()
     group, parts = next(iter(groups))
     first = dataclasses.replace(group, channels=(0,))
     pushed = [np.nan_to_num(part.u).any(axis=0) for part in parts]
@@ -360,7 +360,7 @@ def titles(panels: Sequence[Panel], heights: Sequence[float]) -> list[str]:
     pairs = zip(panels, heights, strict=True)
     folded = []
     for panel, height in pairs:
-        title = style.folded(panel.label, 0.95 * height)
+        title = lettering.folded(panel.label, 0.95 * height)
         folded.append(title)
     return folded
 
@@ -505,7 +505,7 @@ def number_decades(axis: Axis, ends: Pair) -> None:
 
     def numbered(value: float, _: int) -> str:
         first_digit = round(value / 10.0 ** math.floor(math.log10(value) + 1e-9))
-        return style.short(value) if first_digit in (1, *between) else ""
+        return wording.short(value) if first_digit in (1, *between) else ""
 
     axis.set_major_formatter(FuncFormatter(numbered))
     axis.set_minor_formatter(FuncFormatter(numbered))
@@ -573,7 +573,7 @@ def clip_impacts(ax: Axes, panel: Panel, colours: Sequence[str]) -> bool:
             starts = trace.t[np.flatnonzero(begins)]
             heights = np.full(len(starts), side * top)
             ax.plot(starts, heights, color=colour, marker=mark, in_layout=False, **look)
-    note(ax, f"|reaction| up to {style.short(peak, 3)} {style.units(panel.group)['force']}")
+    note(ax, f"|reaction| up to {wording.short(peak, 3)} {shared_axes.units(panel.group)['force']}")
     return True
 
 
@@ -625,8 +625,8 @@ def mark(ax: Axes, changes: Mapping[float, str], named: bool) -> None:
         ax.axvline(time, color=style.INK, lw=style.points(0.9), ls=DOTS, zorder=1.5)
         if not named:
             continue
-        words = style.cropped(change, room, size)
-        width = style.width(words, size)
+        words = lettering.cropped(change, room, size)
+        width = lettering.width(words, size)
         offset = room * time / last
         begin = min(offset, room - width)
         row = 0
@@ -651,7 +651,7 @@ def phase(ax: Axes, panel: Panel, colours: Sequence[str]) -> None:
     for axis, name in zip((ax.xaxis, ax.yaxis), names, strict=True):
         own = panel._replace(quantity=name)
         set_numbers(axis, own)
-        axis.set_label_text(style.folded(own.label))
+        axis.set_label_text(lettering.folded(own.label))
     ax.set(xlim=limits(traces, names[0]), ylim=limits(traces, names[1]))
     is_single = traces[0].x.shape[1] == 1
     width = style.points(LINE if is_single else LIGHT_LINE)

@@ -16,7 +16,7 @@ import numpy as np
 
 from smc_mujoco.common.aliases import Array
 from smc_mujoco.common.text import joined
-from smc_mujoco.draw import style
+from smc_mujoco.draw import shared_axes, style, wording
 from smc_mujoco.mechanisms.hardware.backlash import Backlash
 from smc_mujoco.mechanisms.hardware.contact import RUB
 from smc_mujoco.mechanisms.layout import channel_names, dof_ids
@@ -101,8 +101,8 @@ def off_place(trace: Trace, k: int) -> State | None:
     if not away >= 1.0:
         return None
     if away >= 1e3:  # fewer letters, in a narrow tile
-        return State(f"{style.short(1e-3 * away)} m off", style.INK)
-    return State(f"{style.short(away)} mm off", style.INK)
+        return State(f"{wording.short(1e-3 * away)} m off", style.INK)
+    return State(f"{wording.short(away)} mm off", style.INK)
 
 
 def place_channels(plant: Plant) -> slice:
@@ -117,7 +117,7 @@ def ended(trace: Trace, time: float) -> State | None:
     """Return how a run has failed by a time, s; None if it has not."""
     if trace.diverged_at is None or time < trace.diverged_at:
         return None
-    return State(style.ending(trace), style.MUTED)
+    return State(wording.ending(trace), style.MUTED)
 
 
 def contacts(trace: Trace, shown: Array) -> list[State | None]:
@@ -207,8 +207,8 @@ def largest(trace: Trace, acts: Array, forces: Array) -> Peak:
     size = float(sizes.max())
     for group in conventions.groups(trace.scenario):
         if channel in group.channels:
-            unit = style.units(group)["force"]
-            return Peak(size, int(sample), f"{style.short(size)} {unit}")
+            unit = shared_axes.units(group)["force"]
+            return Peak(size, int(sample), f"{wording.short(size)} {unit}")
     raise AssertionError
 
 

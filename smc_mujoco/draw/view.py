@@ -17,7 +17,7 @@ from smc_mujoco.common.aliases import AnyPath, Array
 from smc_mujoco.common.errors import ScenarioError, shown
 from smc_mujoco.common.files import replacing, with_ending
 from smc_mujoco.control.law import Law
-from smc_mujoco.draw import style
+from smc_mujoco.draw import wording
 from smc_mujoco.draw.session import Session, law_for, laws_of
 from smc_mujoco.mechanisms.named import as_plant
 from smc_mujoco.mechanisms.plant import Plant
@@ -137,7 +137,7 @@ class LiveView:
             gui.reset()
             self.server.scene.reset()
             gui.configure_theme(control_width="large", show_logo=False, show_share_button=False)
-            gui.set_panel_label(style.plant_name(self.session.scenarios[0].plant))
+            gui.set_panel_label(wording.plant_name(self.session.scenarios[0].plant))
             gui.main_panel.dock_right()
             self.machines = Machines(self.server, self.session, self.push)
             self.panel = ViewPanel(gui, self.session, self.machines, self.ask, self.rebuild)

@@ -9,7 +9,7 @@ from viser import ClientHandle, FrameHandle, MeshHandle, SceneNodeDragEvent, Vis
 
 from smc_mujoco.common.aliases import Array
 from smc_mujoco.common.errors import ScenarioError
-from smc_mujoco.draw import style
+from smc_mujoco.draw import colouring, style, wording
 from smc_mujoco.draw.film import arrow_lines, arrows, camera, shared_picture, world
 from smc_mujoco.draw.film.puppet import Puppet, moved_bodies
 from smc_mujoco.draw.film.stage import DEFAULT_RGBA, LAW_SHARE
@@ -71,9 +71,9 @@ class Machines:
             )
         slides = self.model.jnt_type[joints] == mujoco.mjtJoint.mjJNT_SLIDE
         self.carts = shared_picture.places([puppet, puppet], self.turn)
-        self.colours = style.law_colours([scenario.law for scenario in session.scenarios])
+        self.colours = colouring.law_colours([scenario.law for scenario in session.scenarios])
         if len(set(self.colours)) < len(self.colours):  # one law twice
-            self.colours = list(style.RUN_COLOURS[: len(self.colours)])
+            self.colours = list(colouring.RUN_COLOURS[: len(self.colours)])
         self.points = np.concatenate(list(self.reached()))
         self.size = float(np.ptp(self.points, axis=0).max())
         own = float(np.ptp(self.points[: 8 * self.links.sum()], axis=0).max())  # in one pose
@@ -220,7 +220,7 @@ class MachineNodes:
         self.add_bodies()
         self.name = machines.scene.add_label(
             f"/{run}/name",
-            style.law_name(machines.session.scenarios[run].law),
+            wording.law_name(machines.session.scenarios[run].law),
             position=machines.over,
             anchor="bottom-center",
         )

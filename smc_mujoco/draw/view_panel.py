@@ -12,7 +12,7 @@ from viser import GuiApi, GuiEvent, GuiSliderHandle, GuiUplotHandle, uplot
 
 from smc_mujoco.common import html
 from smc_mujoco.common.aliases import Array
-from smc_mujoco.draw import style
+from smc_mujoco.draw import shared_axes, wording
 from smc_mujoco.draw.session import Session, laws_of
 from smc_mujoco.draw.view_machine import Machines, not_shown
 from smc_mujoco.mechanisms.layout import channel_names
@@ -68,7 +68,7 @@ class ViewPanel:
         self.charts = {name: self.add_chart(name) for name in CHARTS}
         tabs = gui.add_tab_group()
         for run, scenario in enumerate(session.scenarios):
-            with tabs.add_tab(f"{run + 1}: {style.law_name(scenario.law)}"):
+            with tabs.add_tab(f"{run + 1}: {wording.law_name(scenario.law)}"):
                 self.add_law(run)
         if len(session.scenarios) == 1:
             self.button("a second law", self.add_run)
@@ -149,7 +149,7 @@ class ViewPanel:
         """Return the title of a chart, with its unit."""
         for group in groups(self.session.scenarios[0]):
             if self.channel in group.channels:
-                return f"{CHARTS[signal]} ({prefix}{style.units(group)[signal]})"
+                return f"{CHARTS[signal]} ({prefix}{shared_axes.units(group)[signal]})"
         return CHARTS[signal]
 
     def add_chart(self, signal: str) -> GuiUplotHandle:
@@ -158,7 +158,7 @@ class ViewPanel:
         for colour, dash, scenario in zip(
             self.machines.colours, DASHES, self.session.scenarios, strict=False
         ):
-            name = style.law_name(scenario.law)
+            name = wording.law_name(scenario.law)
             series.append(uplot.Series(label=name, stroke=colour, width=LINE, dash=dash))
         start = tuple(np.zeros(2) for _ in series)
         return self.gui.add_uplot(

@@ -11,8 +11,8 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
 
 from smc_mujoco.common.aliases import AnyPath
+from smc_mujoco.draw import colouring, style
 from smc_mujoco.draw import page as pages
-from smc_mujoco.draw import style
 
 ROW_HEIGHT = 1.15  # inches, of a motion
 SHARES = (3, 2)  # of the width: references, errors
@@ -31,7 +31,7 @@ def excitation_figure(
     """
     paths = pages.files(path)
     names = list(motions[0].errors)
-    colours = style.spread(len(joints) + len(names))
+    colours = colouring.spread(len(joints) + len(names))
     lines = []
     for joint, colour, dashes in zip(joints, colours, style.DASHES, strict=False):
         lines.append({"color": colour, "lw": 1.2, "ls": dashes, "label": joint})

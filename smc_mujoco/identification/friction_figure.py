@@ -10,8 +10,8 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
 from smc_mujoco.common.aliases import AnyPath, Array, Numbers
+from smc_mujoco.draw import colouring, lettering, shared_axes, style
 from smc_mujoco.draw import page as pages
-from smc_mujoco.draw import style
 from smc_mujoco.identification import first_guess, records
 from smc_mujoco.identification.inverse_dynamics import COMPARED_PERIOD
 from smc_mujoco.identification.log_rig import LogRig
@@ -47,7 +47,7 @@ def friction_figure(
     """
     predicted, measured, t = prediction
     paths = pages.files(path)
-    colour = style.spread(1)[0]
+    colour = colouring.spread(1)[0]
     handles = [
         Line2D([], [], color=style.INK, lw=LOG_WIDTH, label="log"),
         Line2D([], [], color=colour, ls=DASHES, label="found, replayed from the commands"),
@@ -65,11 +65,11 @@ def friction_figure(
             position_axes.plot(t, measured[name], color=style.INK, lw=LOG_WIDTH)
             position_axes.plot(t, predicted[name], color=colour, lw=1.2, ls=DASHES)
             position_axes.set_title(f"fit {fit[name]:.1f} %")
-            position_axes.set_ylabel(style.folded(f"{joint} ({unit})"))
+            position_axes.set_ylabel(lettering.folded(f"{joint} ({unit})"))
             speed = records.rate(measured[name], records.step_of(t))
             residual_axes.axhline(0.0, color=style.RULE, lw=0.8)
             residual = measured[name] - predicted[name]
-            factor, short = style.prefixed(float(np.abs(residual).max()), unit)
+            factor, short = shared_axes.prefixed(float(np.abs(residual).max()), unit)
             residual_axes.plot(speed, factor * residual, ".", ms=1.5, color=colour)
             fit_to(residual_axes, factor * residual, np.zeros(1))
             residual_axes.set_title(f"residual ({short})")

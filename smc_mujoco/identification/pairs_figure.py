@@ -10,8 +10,8 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from smc_mujoco.common.aliases import AnyPath, Array, ArrayPair, Fields
+from smc_mujoco.draw import colouring, style
 from smc_mujoco.draw import page as pages
-from smc_mujoco.draw import style
 
 HEIGHT = 4.2  # inches, of the panel
 SPEEDS = 200  # of a curve, on each side of 0
@@ -37,7 +37,7 @@ def pairs_figure(
     """
     paths = pages.files(path)
     v, torque = pairs
-    colour, *more = style.spread(len(forces))
+    colour, *more = colouring.spread(len(forces))
     looks = _looks(forces, taken, more)
     handles: list[Line2D | Patch] = [
         Line2D([], [], ls="", marker=".", color=style.INK, label="pairs"),

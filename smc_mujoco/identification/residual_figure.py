@@ -12,8 +12,8 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
 from smc_mujoco.common.aliases import AnyPath, Array, Fields, Numbers
+from smc_mujoco.draw import colouring, lettering, shared_axes, style
 from smc_mujoco.draw import page as pages
-from smc_mujoco.draw import style
 from smc_mujoco.identification.records import Record
 from smc_mujoco.identification.rig import Fall
 
@@ -54,7 +54,7 @@ def residual_figure(
         rows = zip(axes, measured.items(), labels, strict=True)
         for (column_axes, residual_axes), (name, values), column in rows:
             unit = units[name].replace(" ", "·")
-            column_axes.set_ylabel(style.folded(f"{column} ({unit})"))
+            column_axes.set_ylabel(lettering.folded(f"{column} ({unit})"))
             column_axes.plot(t, values, **record)
             residuals = {}
             reached = {}
@@ -76,7 +76,7 @@ def _draw_residuals(
 ) -> None:
     """Draw the residuals of a column, twin -> (K,), with the prefix of their unit that suits."""
     largest = max(float(np.abs(error).max()) for error in residuals.values())
-    factor, short = style.prefixed(largest, unit)
+    factor, short = shared_axes.prefixed(largest, unit)
     ax.axhline(0.0, color=style.RULE, lw=0.8)
     for twin, residual in residuals.items():
         ax.plot(t, factor * residual, **looks[twin])
@@ -91,7 +91,7 @@ def _draw_residuals(
 def looks_of(twins: Sequence[str]) -> dict[str, Fields]:
     """Return the look of each twin's lines. The first lies over the others, which are thinner."""
     looks = {}
-    for k, colour in enumerate(style.spread(len(twins))):
+    for k, colour in enumerate(colouring.spread(len(twins))):
         width = TWIN_WIDTH if k == 0 else 0.7 * TWIN_WIDTH
         looks[twins[k]] = {"color": colour, "lw": width, "zorder": 3.0 - 0.1 * k}
     return looks
@@ -112,5 +112,5 @@ def _entitle(ax: Axes, what: str, numbers: Mapping[str, str], share: float) -> N
     if len(numbers) == 1:
         words = next(iter(numbers.values()))
     room = TITLE_MARGIN * 72 * style.FULL_WIDTH * share / sum(SHARES)
-    title = style.wrapped(f"{what}: {words}", room, style.RC["axes.titlesize"], 2, bold=True)
+    title = lettering.wrapped(f"{what}: {words}", room, style.RC["axes.titlesize"], 2, bold=True)
     ax.set_title(title, parse_math=False)

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from smc_mujoco.common.files import replacing
-from smc_mujoco.draw import style
+from smc_mujoco.draw import colouring, style
 from smc_mujoco.problems.tracking_results import TrackingBoard, relative_errors
 
 ROWS = 15  # entries at most: those that stand first in some problem, and those with the least mean
@@ -48,7 +48,7 @@ def draw(board: TrackingBoard, path: Path) -> None:
             words, colour, weight = entry, style.MUTED, "normal"
             if led:
                 words = f"{entry}: led by no other in {led} of {count}"
-                colour, weight = style.law_colour(board.entries[entry].law), "bold"
+                colour, weight = colouring.law_colour(board.entries[entry].law), "bold"
             dots = np.minimum(errors[entry], LARGEST)
             size = style.points(6)
             look = {"color": colour, "mew": 0, "clip_on": False}

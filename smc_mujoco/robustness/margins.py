@@ -46,7 +46,7 @@ from smc_mujoco.control import source
 from smc_mujoco.control.component import Component, Template
 from smc_mujoco.control.law import Law
 from smc_mujoco.control.source import in_words
-from smc_mujoco.draw import style
+from smc_mujoco.draw import colouring
 from smc_mujoco.mechanisms.plant import EFFORT, Plant
 from smc_mujoco.robustness.level_search import COARSE, FINE, find_boundaries
 from smc_mujoco.robustness.margin_cells import Cells, OverSets
@@ -176,7 +176,7 @@ class Margins(Answer, list[Margin]):
                 of_theory = "any" if margin.theory == math.inf else of_theory
                 within = number(margin.resolution) if margin.resolution else ""
                 extra = *[margin.over_sets] * over_sets, *[of_theory] * in_theory
-                law = Cell(margin.law, colour=style.law_colour(margin.law))
+                law = Cell(margin.law, colour=colouring.law_colour(margin.law))
                 rows.append((margin.plant, law, margin.text, within, *extra, margin.unit))
             extra = *["all sets"] * over_sets, *["theory"] * in_theory
             heads = "plant", "law", "margin", "to within", *extra, "unit"

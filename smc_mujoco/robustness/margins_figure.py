@@ -17,8 +17,8 @@ from matplotlib.patches import Patch
 
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.text import number
+from smc_mujoco.draw import colouring, shared_axes, style, wording
 from smc_mujoco.draw import page as pages
-from smc_mujoco.draw import style
 from smc_mujoco.draw.page import Handle, Size
 
 ROW_HEIGHT = 0.3  # inches on a full page, of a law
@@ -71,14 +71,14 @@ def draw(
     down = math.ceil(len(kinds) / across)
     with style.page(width):
         key = _key(found)
-        head = style.titled(title, f"Margins: {style.heading(plants)}")
+        head = wording.titled(title, f"Margins: {wording.heading(plants)}")
         rows = _most_laws(found)
         tall = style.points(AROUND + ROW_HEIGHT * rows) * down * len(plants)
         page = pages.blank(width, height or pages.head_height(width, key, bool(head)) + tall, fig)
         axes = page.subplots(down * len(plants), across, squeeze=False)
         for plant, of_plant in zip(plants, np.split(axes, len(plants)), strict=True):
             if len(plants) > 1:
-                of_plant[0, 0].set_title(style.plant_name(plant), parse_math=False)
+                of_plant[0, 0].set_title(wording.plant_name(plant), parse_math=False)
             for ax, kind in zip(of_plant.flat, kinds, strict=False):
                 here = [entry for entry in found if (entry.plant, entry.kind) == (plant, kind)]
                 _panel(ax, here, named=ax in of_plant[:, 0])
@@ -122,9 +122,9 @@ def _panel(ax: Axes, bars: Sequence[MarginBar], named: bool) -> None:
     unit = bars[0].unit
     factor = 1.0
     if unit != "1":
-        factor, unit = style.prefixed(start + longest, unit)
+        factor, unit = shared_axes.prefixed(start + longest, unit)
     rows = np.arange(len(bars))
-    colours = style.law_colours([bar.law for bar in bars])
+    colours = colouring.law_colours([bar.law for bar in bars])
     start *= factor
     ax.barh(rows, factor * ends - start, 0.6, left=start, color=colours)
     ax.axvline(start, color=style.MUTED, lw=style.points(0.8))
@@ -139,7 +139,7 @@ def _panel(ax: Axes, bars: Sequence[MarginBar], named: bool) -> None:
     ax.set_ylim(len(rows) - 0.5, -0.5)
     unit = unit.replace(" ", "·")
     ax.set_xlabel(bars[0].kind if unit == "1" else f"{bars[0].kind} ({unit})")
-    names = style.distinct([style.law_name(bar.law) for bar in bars])
+    names = wording.distinct([wording.law_name(bar.law) for bar in bars])
     ax.set_yticks(rows, names if named else [""] * len(rows), parse_math=False)
     ax.grid(visible=False, axis="y")
     ax.tick_params(axis="y", length=0)

@@ -13,7 +13,7 @@ from matplotlib.patches import Patch
 
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.control.source import restore
-from smc_mujoco.draw import dark, style
+from smc_mujoco.draw import colouring, dark, style, wording
 from smc_mujoco.draw import page as pages
 from smc_mujoco.robustness.region_of_attraction import CONVERGES, DOES_NOT, Basin
 
@@ -41,11 +41,11 @@ def draw(maps: Sequence[Basin], path: str | os.PathLike[str] | None = None) -> F
             sources.append([restore({"kind": region.source, "search": None})])
         words, gains = pages.gain_sources(sources)
         for ax, region, source in zip(axes, maps, words, strict=True):
-            name = style.law_name(region.law)
+            name = wording.law_name(region.law)
             if len(plants) > 1:
-                name += f", {style.plant_name(region.plant, short=True)}"
+                name += f", {wording.plant_name(region.plant, short=True)}"
             draw_map(ax, region, after, name + source.replace(", ", "\n"))
-        pages.set_head(page, width, style.heading(plants, short=len(plants) > 1), [rest], gains)
+        pages.set_head(page, width, wording.heading(plants, short=len(plants) > 1), [rest], gains)
         return pages.write(page, paths)
 
 
@@ -84,7 +84,7 @@ def colours_of(law: str) -> list[str]:
 
     All differ in lightness, so also with colour blindness and in grey.
     """
-    shades = style.ramp(style.law_colour(law), SHADES, LIGHTEST)
+    shades = colouring.ramp(colouring.law_colour(law), SHADES, LIGHTEST)
     return [*reversed(shades), UNDECIDED, style.FAILED]
 
 

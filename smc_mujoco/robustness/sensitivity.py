@@ -38,7 +38,7 @@ from smc_mujoco.common.errors import ScenarioError, shown
 from smc_mujoco.common.progress import bar
 from smc_mujoco.common.tabular import Cell, Tabular
 from smc_mujoco.common.text import joined
-from smc_mujoco.draw import style
+from smc_mujoco.draw import shared_axes
 from smc_mujoco.metrics.catalogue import CATALOGUE, metric_of
 from smc_mujoco.metrics.conventions import Metric, by_group
 from smc_mujoco.robustness.margin_kinds import REST_SHARE, TOLERATED_ERROR
@@ -469,7 +469,7 @@ def _with_unit(value: float, unit: str) -> str:
         return f"+{value:.3g}"
     if unit in ("counts", "periods"):
         return f"{value:.5g} {unit}"
-    factor, prefixed = style.prefixed(value, unit)
+    factor, prefixed = shared_axes.prefixed(value, unit)
     return f"{factor * value:.3g} {prefixed}"
 
 

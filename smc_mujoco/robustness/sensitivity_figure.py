@@ -13,8 +13,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure, SubFigure
 from matplotlib.patches import Patch, Rectangle
 
+from smc_mujoco.draw import colouring, shared_axes, style, wording
 from smc_mujoco.draw import page as pages
-from smc_mujoco.draw import style
 from smc_mujoco.draw.page import Handle, Size
 from smc_mujoco.metrics.catalogue import CATALOGUE
 from smc_mujoco.robustness.sobol import CHANCE, Cut, SobolResult, Space, in_words
@@ -38,11 +38,11 @@ def draw(
     """Draw a sensitivity; arguments as in `figure`."""
     paths = pages.files(path, format)
     width, height = pages.measure(size, fig)
-    colour = style.law_colour(found.scenario.law)
+    colour = colouring.law_colour(found.scenario.law)
     pale = style.mixed(colour, style.PAPER, PALE_SHARE)
-    name = style.law_name(found.scenario.law)
-    about = f"What breaks {name}: {style.plant_name(found.scenario.plant)}"
-    head = style.titled(title, about)
+    name = wording.law_name(found.scenario.law)
+    about = f"What breaks {name}: {wording.plant_name(found.scenario.plant)}"
+    head = wording.titled(title, about)
     with style.page(width):
         worse = f"a run, darker: worse {CATALOGUE[found.metric].label}"
         handles: list[Handle] = [
@@ -101,7 +101,7 @@ def _runs(ax: Axes, found: SobolResult, colour: str) -> None:
     factors = []
     for i, axis in zip(places, (ax.xaxis, ax.yaxis), strict=False):
         _, high, unit = space.ends[i]
-        factor, unit = style.prefixed(high, unit)
+        factor, unit = shared_axes.prefixed(high, unit)
         factors.append(factor)
         columns.append(factor * space.column(i, found.shares))
         axis.set_label_text(f"{in_words(space.names[i])} ({unit or 'of nominal'})")
@@ -113,7 +113,7 @@ def _runs(ax: Axes, found: SobolResult, colour: str) -> None:
         unit = found.unit and f" ({found.unit})"
         ax.set_ylabel(f"{CATALOGUE[found.metric].label}{unit}")
     order = np.argsort(found.values)  # the worst on top
-    shades = np.array(style.ramp(colour, TONES, LIGHTEST))
+    shades = np.array(colouring.ramp(colour, TONES, LIGHTEST))
     tones = np.empty(len(order), object)
     steps = np.linspace(0.0, TONES - 0.5, len(order)).astype(int)
     tones[order] = shades[steps]

@@ -30,7 +30,8 @@ from smc_mujoco.common.files import read_json, write_json
 from smc_mujoco.common.progress import bar
 from smc_mujoco.common.tabular import Cell, Tables, Tabular
 from smc_mujoco.control.source import in_words
-from smc_mujoco.draw.style import law_colour, law_name, plant_name
+from smc_mujoco.draw.colouring import law_colour
+from smc_mujoco.draw.wording import law_name, plant_name
 from smc_mujoco.metrics.catalogue import CATALOGUE, metric_of
 from smc_mujoco.metrics.conventions import Metric
 from smc_mujoco.robustness.uncertainty import (

@@ -14,7 +14,7 @@ from smc_mujoco.common.aliases import Names
 from smc_mujoco.common.tabular import Cell, Tabular
 from smc_mujoco.common.text import capital, joined, span
 from smc_mujoco.control.source import NONE, kinds
-from smc_mujoco.draw import style
+from smc_mujoco.draw import colouring, wording
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.studies.board import Board, BoardEntry, sources
 from smc_mujoco.studies.board_numbers import heading, in_order, sizes
@@ -133,7 +133,7 @@ class Boards(Answer, list[Board]):
 
     def _name(self, law: str) -> str:
         """Return what LaTeX calls a law."""
-        return self.labels.get(law) or style.law_name(law)
+        return self.labels.get(law) or wording.law_name(law)
 
     def _table(self, boards: Sequence[Board]) -> Tabular:
         """Return the medians of one group of runs, with the verdicts below in print."""
@@ -144,7 +144,7 @@ class Boards(Answer, list[Board]):
                 cells.setdefault(entry.law, [""] * len(boards))[i] = _cell(board, entry)
         rows = []
         for law in in_order(boards):
-            colour = style.law_colour(law)
+            colour = colouring.law_colour(law)
             name = Cell(law, kinds(sources_of[law]), colour=colour, label=self._name(law))
             rows.append([name, *cells[law]])
         largest = max(boards, key=lambda board: len(board.blocks))
@@ -156,7 +156,7 @@ class Boards(Answer, list[Board]):
             rows=rows,
             title=_title(largest, plant),
             label=_title(
-                largest, style.plant_name(self.plants.get(plant, plant)), style.condition_name
+                largest, wording.plant_name(self.plants.get(plant, plant)), wording.condition_name
             ),
             notes=list(itertools.chain.from_iterable(board.lines for board in boards)),
             under=[f"{capital(': '.join(pair))}." for pair in answers.verdict_lines(in_print)],

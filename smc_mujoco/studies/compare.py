@@ -42,7 +42,7 @@ from smc_mujoco.control import gain_sets, source
 from smc_mujoco.control.component import Template, gains_text
 from smc_mujoco.control.law import Law, catalogue, suits
 from smc_mujoco.control.properties import suitable
-from smc_mujoco.draw import style
+from smc_mujoco.draw import wording
 from smc_mujoco.mechanisms.named import as_plant
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.metrics.catalogue import CATALOGUE
@@ -373,7 +373,7 @@ class Compared(Answer):
     def title(self) -> str:
         """The title of the page: the laws and the plants."""
         laws = dict.fromkeys(itertools.chain.from_iterable(self.gains.values()))
-        return f"{joined([*map(style.law_name, laws)])} on {joined(self._plant_names)}"
+        return f"{joined([*map(wording.law_name, laws)])} on {joined(self._plant_names)}"
 
     @property
     def words(self) -> Names:
@@ -429,7 +429,7 @@ class Compared(Answer):
     @property
     def _plant_names(self) -> list[str]:
         """The names of the plants in pictures."""
-        return [style.plant_name(scenario.plant) for scenario in self._first_runs.values()]
+        return [wording.plant_name(scenario.plant) for scenario in self._first_runs.values()]
 
     @property
     def _first_runs(self) -> dict[str, Scenario]:

@@ -18,7 +18,7 @@ from matplotlib.figure import Figure
 from matplotlib.text import Text
 
 import smc_mujoco as smc
-from smc_mujoco.draw import coincidence, horizon, panels, quantities, style
+from smc_mujoco.draw import coincidence, colouring, horizon, panels, quantities, style, wording
 from smc_mujoco.draw import page as pages
 from smc_mujoco.draw.figure import figure
 
@@ -165,7 +165,7 @@ def test_controls_whose_bands_would_hide_each_other_have_a_row_each(one):
         names.append(row.get_legend().get_texts()[0].get_text())
         colours.append(curves(row)[0].get_color())
     assert names == ["Observer-free", "Classical", "Adaptive"]
-    assert colours == style.law_colours(["observer_free", "classical", "adaptive"])
+    assert colours == colouring.law_colours(["observer_free", "classical", "adaptive"])
     assert len({row.get_ylim() for row in rows(page.axes[1])}) == 1
 
 
@@ -221,7 +221,7 @@ def test_runs_of_one_law_are_told_apart_by_what_differs(one):
         one, scenario=dataclasses.replace(scenario, law=smc.law("classical", k=3.0, c=5.0))
     )
     pid_run = under(one, "pid", 0.5)
-    assert style.labels([slow, fast, pid_run], None) == [
+    assert wording.labels([slow, fast, pid_run], None) == [
         "Classical: c = 2",
         "Classical: c = 5",
         "PID",
@@ -229,11 +229,11 @@ def test_runs_of_one_law_are_told_apart_by_what_differs(one):
     noisy = dataclasses.replace(
         slow, scenario=dataclasses.replace(slow.scenario, input_delay=0.005)
     )
-    assert style.labels([slow, noisy], None) == [
+    assert wording.labels([slow, noisy], None) == [
         "Classical: input delay = 0",
         "Classical: input delay = 0.005",
     ]
-    assert style.labels([slow, slow], None) == ["Classical 1", "Classical 2"]
+    assert wording.labels([slow, slow], None) == ["Classical 1", "Classical 2"]
 
 
 def test_words_above_the_curves_tell_which_agree_and_until_when(one):
@@ -502,7 +502,7 @@ def test_marks_of_a_board_are_medians_by_law_from_above_and_a_law_that_never_set
         size=size,
     )
     settling, bound, settles = page.axes
-    for k, (law, colour) in enumerate(zip(laws, style.law_colours(laws), strict=True)):
+    for k, (law, colour) in enumerate(zip(laws, colouring.law_colours(laws), strict=True)):
         sizes = []
         for name in ("nominal", "noise"):
             sizes.append([row[4] for row in rows.rows if row[1:3] == (name, law)])

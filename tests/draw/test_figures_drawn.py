@@ -16,7 +16,7 @@ from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 
 import smc_mujoco as smc
-from smc_mujoco.draw import panels, style
+from smc_mujoco.draw import colouring, panels, style, wording
 from smc_mujoco.draw.figure import figure
 from smc_mujoco.mechanisms.hardware.friction import Coulomb
 from smc_mujoco.robustness import region_figure
@@ -235,7 +235,7 @@ def test_a_figure_has_the_panels_that_its_mechanism_has_in_their_units_and_no_ot
 def test_lines_and_bands_are_the_run_from_its_start_to_its_end_or_its_failure():
     traces = machines()
     page = figure(traces)
-    colours = style.law_colours([trace.scenario.law for trace in traces])
+    colours = colouring.law_colours([trace.scenario.law for trace in traces])
     ends = [1.2, 1.2, 0.699]
     for label, values in {
         "position x (m)": "x",
@@ -361,10 +361,10 @@ def test_shares_of_a_map_are_those_of_its_states_and_add_up():
             colours.append(to_hex(colour))
         assert (
             colours[0]
-            == style.ramp(style.law_colour(basin.law), 3, region_figure.LIGHTEST)[2].lower()
+            == colouring.ramp(colouring.law_colour(basin.law), 3, region_figure.LIGHTEST)[2].lower()
         )
         assert colours[4] == style.FAILED.lower(), "grey, not another law's orange"
-        assert ax.get_title(loc="left") == style.law_name(basin.law)
+        assert ax.get_title(loc="left") == wording.law_name(basin.law)
     assert page.legends[0].get_title().get_text() == "Van der Pol oscillator"
     assert "gains: tuned here" in [text.get_text() for text in page.texts + page.artists]
 

@@ -9,7 +9,7 @@ import pytest
 from helpers import arms
 
 import smc_mujoco as smc
-from smc_mujoco.draw import style
+from smc_mujoco.draw import timed_events
 from smc_mujoco.draw.figure import figure
 from smc_mujoco.draw.film import charts
 
@@ -59,8 +59,8 @@ def test_a_blow_and_a_payload_are_marked_and_named(trace):
         duration=0.002,
     )
     (run,) = smc.run([picked])
-    events = style.events([run], ["none"])
-    assert style.marks(events) == {0.001: "blow of 50 N for 20 ms; payload + 2 kg"}
+    events = timed_events.events([run], ["none"])
+    assert timed_events.marks(events) == {0.001: "blow of 50 N for 20 ms; payload + 2 kg"}
     assert [event.stop for event in events] == [pytest.approx(0.021), math.inf]
 
 

@@ -9,7 +9,7 @@ from matplotlib.text import Text
 from PIL import Image
 
 import smc_mujoco as smc
-from smc_mujoco.draw import page, style
+from smc_mujoco.draw import lettering, page, style
 
 
 def wide(labels: list[str], columns: int, size: float) -> float:
@@ -17,7 +17,7 @@ def wide(labels: list[str], columns: int, size: float) -> float:
     widths = []
     for label in labels:
         widths.append(
-            max(style.width(line, size) for line in label.split("\n"))
+            max(lettering.width(line, size) for line in label.split("\n"))
             + (page.ENTRY_SAMPLE + page.ENTRY_SPACE) * size
         )
     return sum(max(part) for part in np.array_split(widths, columns))

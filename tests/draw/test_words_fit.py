@@ -13,7 +13,7 @@ from helpers.boxes import check, recorded, words_of
 
 import smc_mujoco as smc
 from smc_mujoco.common import gl
-from smc_mujoco.draw import style
+from smc_mujoco.draw import wording
 from smc_mujoco.draw.film import film
 from smc_mujoco.studies import scene as scenes
 
@@ -53,7 +53,7 @@ def runs(name):
     title = scene.title
     if len(scene.conditions) > 1:
         title += f", {scene.film}"
-    return smc.run(short), [*map(style.label, scenarios)], title, scene.camera
+    return smc.run(short), [*map(wording.label, scenarios)], title, scene.camera
 
 
 SCENES = []

@@ -145,10 +145,10 @@ def which(
 
 def _worst_title(recommendation: "Recommendation") -> str:
     """Return the title of a figure or a film of the worst run of a race's first law."""
-    from smc_mujoco.draw import style
+    from smc_mujoco.draw import wording
 
     run = recommendation.worst_trace.scenario
-    return f"Worst run, {run.condition}: {style.head([run])}"
+    return f"Worst run, {run.condition}: {wording.head([run])}"
 
 
 def _film(

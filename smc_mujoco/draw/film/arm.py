@@ -11,7 +11,7 @@ import numpy as np
 from PIL import Image, ImageDraw
 
 from smc_mujoco.common.aliases import Array
-from smc_mujoco.draw import style
+from smc_mujoco.draw import style, timed_events
 from smc_mujoco.draw.decimate import windows
 from smc_mujoco.draw.film import arrows, flat_arrows
 from smc_mujoco.draw.film.stage import Stage
@@ -143,7 +143,7 @@ def overlays(stages: Sequence[Stage]) -> list[Overlay]:
     sizes = []
     for stage in stages:
         trace = stage.track.trace
-        for blow in style.pushes([trace]):
+        for blow in timed_events.pushes([trace]):
             peak = math.hypot(blow.x, blow.y, blow.z)
             sizes.append(peak)
         if tip.knows_contacts(trace.scenario):

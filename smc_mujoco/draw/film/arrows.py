@@ -15,7 +15,7 @@ import mujoco
 import numpy as np
 
 from smc_mujoco.common.aliases import Array
-from smc_mujoco.draw import quantities, style
+from smc_mujoco.draw import quantities, shared_axes, style, timed_events, wording
 from smc_mujoco.draw.decimate import Envelope, windows
 from smc_mujoco.draw.film import world
 from smc_mujoco.draw.panels import Panel, by_channel
@@ -124,7 +124,7 @@ class Scale(NamedTuple):
 def _of_one_unit(traces: Sequence[Trace]) -> dict[ChannelGroup, Sequence[Trace]]:
     """Return the traces of each group of channels, or of each channel where units of u differ."""
     traces_by_group = {}
-    for group, parts in style.split(traces).items():
+    for group, parts in shared_axes.split(traces).items():
         if group.effort or traces[0].scenario.plant.pose:
             traces_by_group[group] = parts
             continue
@@ -169,7 +169,7 @@ def scales(traces: Sequence[Trace]) -> dict[ChannelGroup, Scale]:
     longest = max(lasting) or max(brief)
     scaled = {}
     for group, scale in scale_by_group.items():
-        units = style.units(group)
+        units = shared_axes.units(group)
         full = scale.full or longest
         scaled[group] = scale._replace(
             longest=longest, full=full, units=(units["u"], units["force"])
@@ -196,7 +196,7 @@ def along(force: Array, scale: Scale, body: str) -> Arrow:
     size = float(np.linalg.norm(force))
     length = size / scale.longest
     cut = length > MAX_BLOW
-    words = f"{style.short(size)} N" if cut else ""
+    words = f"{wording.short(size)} N" if cut else ""
     shade = rgba(style.DISTURBANCE)
     way = force / size
     return Arrow(0.0, length, shade, way=way, body=body, cut=cut, words=words, foot=True)
@@ -229,7 +229,7 @@ def key(traces: Sequence[Trace], scales: Mapping[ChannelGroup, Scale]) -> list[s
         sizes = []
         for scale in scales.values():
             if size := getattr(scale, kind):
-                sizes.append(f"{style.short(size)} {scale.units[kind != 'control']}")
+                sizes.append(f"{wording.short(size)} {scale.units[kind != 'control']}")
         if sizes:
             words.append(f"→ {name} {', '.join(sizes)}")
             break
@@ -267,7 +267,7 @@ def arrows(
         cut = abs(mean) > CUT
         if cut:
             unit = scale.units[name in ("disturbance", "reaction", "force")]
-            words = f"{style.short(abs(mean) * longest)} {unit}"
+            words = f"{wording.short(abs(mean) * longest)} {unit}"
         kind = {"hollow": name == "reaction", "foot": name == "disturbance"}
         drawn.append(Arrow(0.0, mean, shade, layer, size, cut=cut, words=words, **kind))
         if layer == 0 and scale.control and high - low > MIN_BAR:
@@ -328,7 +328,7 @@ def is_network(plant: Plant) -> bool:
 def blows(trace: Trace, start: float, stop: float) -> list[tuple[str, Array]]:
     """Return the bodies that blows hit between two times, s, with the peak of each, (3,) N."""
     forces = []
-    for push in style.pushes([trace]):
+    for push in timed_events.pushes([trace]):
         if start <= push.time + push.width and stop >= push.time:
             force = np.array([push.x, push.y, push.z])
             forces.append((push.body, force))

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from smc_mujoco.draw import states, style
+from smc_mujoco.draw import shared_axes, states
 from smc_mujoco.draw.panels import (
     HEIGHT,
     SINGLE,
@@ -54,7 +54,7 @@ def candidates(traces: Sequence[Trace]) -> list[Panel]:
     motions = []
     controls = []
     errors = []
-    for group_traces in style.split(traces).items():
+    for group_traces in shared_axes.split(traces).items():
         place = Panel("x", *group_traces)
         error = place._replace(quantity="settling")
         many = len(place.group.channels) > 1

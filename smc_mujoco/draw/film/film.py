@@ -29,7 +29,7 @@ from smc_mujoco.common.aliases import AnyPath, Array, Pair
 from smc_mujoco.common.errors import ScenarioError, items_of, number
 from smc_mujoco.common.files import clear_abandoned, replacing, with_ending
 from smc_mujoco.common.progress import Bar, bar
-from smc_mujoco.draw import horizon, style
+from smc_mujoco.draw import horizon, shared_axes, style
 from smc_mujoco.draw.decimate import end
 from smc_mujoco.draw.figure import DrawnRuns
 from smc_mujoco.draw.film import arrows, camera, pace, shared_picture
@@ -95,7 +95,7 @@ class Frames:
     def __post_init__(self) -> None:
         self.camera = checked(self.camera)
         if self.at is not None:
-            last = end(style.traces_of_one_plant(self.traces))
+            last = end(shared_axes.traces_of_one_plant(self.traces))
             time = number("at", self.at, low=0.0, high=last + 1e-9)
             self.clock = pace.clock(self.traces, self.fps, self.speed).still(time)
         else:

@@ -9,7 +9,7 @@ import numpy as np
 from PIL import Image, ImageDraw
 
 from smc_mujoco.common.aliases import Array
-from smc_mujoco.draw import style
+from smc_mujoco.draw import lettering, style
 from smc_mujoco.draw.film.arrows import WHITE, Arrow
 from smc_mujoco.draw.film.dilation import widened
 
@@ -119,7 +119,7 @@ def write(image: Image.Image, arrow: Arrow, line: Array, scale: float, taken: li
     ends = (line[0], line[-1]) if arrow.body else (line[-1], line[0])
     for size in (LETTERS, SMALL_LETTERS):
         high = size * scale
-        half = np.array([style.width(arrow.words, high, bold=True), high]) / 2 + GAP * scale
+        half = np.array([lettering.width(arrow.words, high, bold=True), high]) / 2 + GAP * scale
         most = np.array(image.size) - half
         places = number_places(ends, half, most, 6 * scale)
         if size == SMALL_LETTERS:
@@ -130,7 +130,7 @@ def write(image: Image.Image, arrow: Arrow, line: Array, scale: float, taken: li
             if inside and is_apart(box, taken):
                 taken.append(box)
                 rim = {"stroke_width": round(2 * scale), "stroke_fill": style.PAPER}
-                letters = style.font(high, True)
+                letters = lettering.font(high, True)
                 centre = tuple(place.tolist())
                 colour = bytes_of(arrow.rgba)
                 ImageDraw.Draw(image).text(centre, arrow.words, colour, letters, anchor="mm", **rim)

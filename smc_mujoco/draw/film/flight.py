@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
 from smc_mujoco.common.aliases import Array
-from smc_mujoco.draw import panels, quantities, style
+from smc_mujoco.draw import panels, quantities, shared_axes, style
 from smc_mujoco.simulation.trace import Trace
 
 PATH = 1.5  # points, width of a path
@@ -51,7 +51,7 @@ def draw_map(ax: Axes, panel: panels.Panel, colours: Sequence[str]) -> list[Flig
     goals = [trace.r for trace in panel.traces]
     flown = quantities.lasting(panel.traces, "x")
     seen = np.concatenate([*flown, *goals])[:, axes]
-    factor, unit = style.prefixed(float(np.ptp(seen, axis=0).max()), "m")
+    factor, unit = shared_axes.prefixed(float(np.ptp(seen, axis=0).max()), "m")
     ax.set_title(f"{along} over {across} ({unit})", fontweight="normal")
     low = factor * seen.min(axis=0)
     high = factor * seen.max(axis=0)

@@ -18,7 +18,7 @@ import numpy as np
 from smc_mujoco.analysis.paired_runs import floor
 from smc_mujoco.common.aliases import Array
 from smc_mujoco.common.constraints import Number, constrained
-from smc_mujoco.draw import states, style
+from smc_mujoco.draw import shared_axes, states, timed_events
 from smc_mujoco.draw.decimate import end, finite
 from smc_mujoco.metrics.catalogue import chattering_amplitude, chattering_frequency
 from smc_mujoco.simulation import model as models
@@ -90,7 +90,7 @@ def clock(traces: Trace | Sequence[Trace], fps: Rate, speed: Speed | None = None
     """Return the times of a film's frames from t = 0 to the end of the longest trace; `speed` None:
     the rule above.
     """
-    traces = style.traces_of_one_plant(traces)
+    traces = shared_axes.traces_of_one_plant(traces)
     duration = end(traces)
     if speed is not None:
         count = int(duration * fps / speed + 1e-6) + 1
@@ -185,7 +185,7 @@ def speeds(traces: Sequence[Trace], fps: float) -> tuple[Array, Array]:
     for start in impacts(runs):
         powers[np.abs(grid + 0.5 / fps - start) <= IMPACT_TIME] = MAX_HALVINGS
     pushed = np.zeros(len(grid), bool)
-    for push in style.pushes(runs):
+    for push in timed_events.pushes(runs):
         away = grid + 0.5 / fps - push.time - 0.5 * push.width
         pushed |= np.abs(away) <= IMPACT_TIME
     moved = (travel > REST_TRAVEL) | pushed

@@ -22,7 +22,7 @@ from matplotlib.ticker import MaxNLocator
 
 from smc_mujoco.common.aliases import Array
 from smc_mujoco.control.source import DEFAULT
-from smc_mujoco.draw import lanes, panels, style
+from smc_mujoco.draw import lanes, lettering, panels, style, wording
 from smc_mujoco.draw import page as pages
 from smc_mujoco.draw.figure import DrawnRuns
 from smc_mujoco.draw.film import charts, flight
@@ -89,7 +89,7 @@ def room_of(size: tuple[int, int], lines: int) -> Room:
 
 def clock_room(size: tuple[int, int], stop: float) -> float:
     """Return the room for the clock of a film that ends at a time, s, px."""
-    return style.width(f"{stop:.3f} s", letters(size), bold=True)
+    return lettering.width(f"{stop:.3f} s", letters(size), bold=True)
 
 
 def key_room(size: tuple[int, int], stop: float, title: str = "") -> float:
@@ -98,9 +98,9 @@ def key_room(size: tuple[int, int], stop: float, title: str = "") -> float:
     """
     high = letters(size)
     room = size[0] - 2 * EDGE * high
-    room -= clock_room(size, stop) + style.width(PACE, high) + 2 * high
+    room -= clock_room(size, stop) + lettering.width(PACE, high) + 2 * high
     if title:
-        room -= style.width(title, high, bold=True) + high
+        room -= lettering.width(title, high, bold=True) + high
     return room
 
 
@@ -111,7 +111,7 @@ def head_lines(
     the keys and the clock, and nothing happens to the plants, which is told there, too; without a
     title one. A film of default gains always says so.
     """
-    head = one_line(style.titled(title, runs.head))
+    head = one_line(wording.titled(title, runs.head))
     if not head:
         return 1
     if runs.events:
@@ -120,7 +120,7 @@ def head_lines(
     gains = least_gains(runs.gains)
     for key in keys:
         words = " · ".join(filter(None, [*key, gains]))
-        if style.width(words, letters(size)) > room:
+        if lettering.width(words, letters(size)) > room:
             return 2
     return 1
 
@@ -144,7 +144,8 @@ def joint_shortened(label: str, room: float, high: float) -> str:
     the quantity and its unit stay.
     """
     name, gap, quantity = label.partition(" ")
-    return style.cropped(name, room - style.width(gap + quantity, high), high) + gap + quantity
+    rest = gap + quantity
+    return lettering.cropped(name, room - lettering.width(rest, high), high) + rest
 
 
 class Labels(NamedTuple):
@@ -161,9 +162,9 @@ class Labels(NamedTuple):
         for share in (1.0, LEAST_TITLE):
             size = share * high
             words = []
-            for name in style.distinct(names):
+            for name in wording.distinct(names):
                 parts = name.replace("_", "_ ")
-                lines = style.wrapped(parts, room - EDGE * high, size, MAX_LINES)
+                lines = lettering.wrapped(parts, room - EDGE * high, size, MAX_LINES)
                 words.append(lines.replace("_ ", "_"))
             if not any("…" in name for name in words):
                 break
@@ -177,9 +178,9 @@ def label_sizes(names: Sequence[str], size: tuple[int, int], room: float) -> tup
     high = letters(size)
     labels = Labels.of(names, room, high)
     sizes = []
-    for words, name in zip(labels.words, style.distinct(names), strict=True):
+    for words, name in zip(labels.words, wording.distinct(names), strict=True):
         lines = [name] if "…" in words else words.split("\n")
-        wide = style.widest(lines, labels.letters)
+        wide = lettering.widest(lines, labels.letters)
         tall = LINE_PITCH * (1 + words.count("\n")) * labels.letters + SAMPLE * high
         sizes.append((wide + EDGE * high, tall))
     return np.array(sizes), labels.letters / high
@@ -215,7 +216,7 @@ class Sheet:
             inches = (WIDTH, WIDTH * size[1] / size[0])
             self.page = Figure(figsize=inches, dpi=size[0] / WIDTH)
             self.canvas = FigureCanvasAgg(self.page)
-            self.write_head(one_line(style.titled(title, runs.head)), key, lines, order)
+            self.write_head(one_line(wording.titled(title, runs.head)), key, lines, order)
             self.write_labels(labels)
             rim = withStroke(linewidth=style.points(3), foreground=style.PAPER)
             corners = tiles[:, :2] + STATE_PLACE * self.letters
@@ -252,9 +253,9 @@ class Sheet:
         stop = self.start + self.runs.span[1]
         left_edge = EDGE * high
         right = self.size[0] - left_edge
-        wide = style.width(title, high, bold=True)
+        wide = lettering.width(title, high, bold=True)
         share = max(LEAST_TITLE, min(1.0, (right - left_edge) / max(wide, 1.0)))
-        words = style.cropped(title, right - left_edge, share * high, bold=True)
+        words = lettering.cropped(title, right - left_edge, share * high, bold=True)
         first = FIRST_LINE * LINE_PITCH * high
         title_size = share * ONE_SIZE["axes.titlesize"]
         self.write(left_edge, first, words, va="center", weight="bold", fontsize=title_size)
@@ -269,12 +270,12 @@ class Sheet:
         right -= clock_room(self.size, stop) + high
         self.pace = self.write(right, last, ha="right", va="center", color=style.MUTED)
         said = list(filter(None, [*key, order, self.runs.gains]))
-        if style.width(" · ".join(said), high) > self.room:
+        if lettering.width(" · ".join(said), high) > self.room:
             said = list(filter(None, [*key, order, least_gains(self.runs.gains)]))
         least = int(lines == 2 or not title)  # beside the title there may be no words
-        while len(said) > least and style.width(" · ".join(said), high) > self.room:
+        while len(said) > least and lettering.width(" · ".join(said), high) > self.room:
             said.pop()
-        self.key = style.cropped(" · ".join(said), self.room, high)
+        self.key = lettering.cropped(" · ".join(said), self.room, high)
         self.below = self.write(left_edge, last, va="center", color=style.MUTED)
 
     def write_labels(self, labels: Array) -> None:
@@ -310,7 +311,7 @@ class Sheet:
         panels = charts.strip(self.runs.early)
         settled = list(map(settles_at, self.runs.traces))
         wide = self.size[0] / len(panels)
-        label_width = style.width("−00.00", high) + 0.5 * high
+        label_width = lettering.width("−00.00", high) + 0.5 * high
         top = (1.0 - CHARTS_SHARE) * self.size[1] + 1.15 * LINE_PITCH * high
         foot = 1.15 * LINE_PITCH * high
         room = wide - label_width - EDGE * high
@@ -339,8 +340,8 @@ class Sheet:
     def set_time(self, ax: Axes) -> None:
         """Set the time axis of axes: all have the same ticks, whatever their width."""
         stop = self.runs.span[0]
-        narrow = 0.5 * self.size[0] - style.width("−00.00smooth", self.letters)
-        count = int(narrow / style.width("0.0000", self.letters))
+        narrow = 0.5 * self.size[0] - lettering.width("−00.00smooth", self.letters)
+        count = int(narrow / lettering.width("0.0000", self.letters))
         locator = MaxNLocator(min(max(count, 1), TIME_TICKS), steps=pages.STEPS)
         ticks = np.asarray(locator.tick_values(0.0, stop))
         seen = (ticks >= 0.0) & (ticks <= stop * (1.0 + 1e-9))
@@ -352,7 +353,7 @@ class Sheet:
         if len(ticks) > 1:
             box = ax.get_position()
             middle = (box.x0 + box.width * ticks[-1] / stop) * self.size[0]
-            reach = middle + 0.5 * style.width(labels[-1].get_text(), self.letters)
+            reach = middle + 0.5 * lettering.width(labels[-1].get_text(), self.letters)
             if ticks[-1] > stop * (1.0 - 1e-9) or reach > self.size[0]:  # it stays on the page
                 labels[-1].set_horizontalalignment("right")
         ax.tick_params(length=0)
@@ -406,7 +407,7 @@ class Sheet:
         said = words or self.key
         self.below.set(text=said, alpha=opacity)
         pace = "" if moment.still else pace_words(moment.speed)
-        if pace and self.room - style.width(said, self.letters) < APART * self.letters:
+        if pace and self.room - lettering.width(said, self.letters) < APART * self.letters:
             pace = f"· {pace}"  # else they read as one phrase
         self.pace.set_text(pace)
         for text, state in zip(self.says, moment.states, strict=True):
@@ -429,7 +430,7 @@ class Sheet:
                     when = f", {event.time:.2f} to {event.stop:.2f} s"
                 opacity = 1.0 - passed / EVENT_TIME
                 words = event.words + when
-                if style.width(words, self.letters) > self.room:  # the machines' names say how
+                if lettering.width(words, self.letters) > self.room:  # the machines' names say how
                     words = f"changed{when}"
         return words, opacity
 

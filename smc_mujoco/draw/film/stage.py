@@ -13,7 +13,7 @@ from PIL import Image, ImageDraw
 
 from smc_mujoco.common.aliases import Array
 from smc_mujoco.common.errors import ScenarioWarning, users_stacklevel
-from smc_mujoco.draw import style
+from smc_mujoco.draw import lettering, style
 from smc_mujoco.draw.film import arrow_lines, arrows, camera, flat_arrows, world
 from smc_mujoco.draw.film.canvas import Canvas
 from smc_mujoco.draw.film.puppet import Puppet, moved_bodies
@@ -192,7 +192,7 @@ class Stage:
         self.words = []
         if state := track.states[frame]:
             high = flat_arrows.LETTERS * self.scale
-            wide = STATE_PLACE * high + style.width(state.words, high, bold=True)
+            wide = STATE_PLACE * high + lettering.width(state.words, high, bold=True)
             self.words.append(np.array([(0.0, 0.0), (wide, STATE_HEIGHT * high)]))
         goal = None if failed else track.r[frame]
         self.arrange(track.x[frame], track.ahead[frame], time, goal)

@@ -34,7 +34,7 @@ from smc_mujoco.control import gain_sets as sets
 from smc_mujoco.control.component import Template
 from smc_mujoco.control.law import Law
 from smc_mujoco.control.source import by_words, kinds
-from smc_mujoco.draw.style import law_colour
+from smc_mujoco.draw.colouring import law_colour
 from smc_mujoco.evidence.accuracy.scaling import QUANTITIES, Accuracy, scaling
 from smc_mujoco.mechanisms.named import as_plant
 from smc_mujoco.mechanisms.plant import Plant

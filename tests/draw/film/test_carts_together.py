@@ -9,7 +9,7 @@ from helpers.films import staged, without_charts
 
 import smc_mujoco as smc
 from smc_mujoco.common import gl
-from smc_mujoco.draw import states, style
+from smc_mujoco.draw import colouring, states, style
 from smc_mujoco.draw.film import arrow_lines, arrows, film, world
 from smc_mujoco.draw.film.sheet import label_sizes
 
@@ -35,7 +35,7 @@ def test_carts_share_a_picture_in_which_each_is_in_its_colour_and_larger():
     assert place.lanes is not None
     assert place.tiles[0, 2] == place.tiles[1, 0]
     (frame,) = film.Frames(traces, size=SIZE, at=0.2)
-    for colour in style.trace_colours(traces):
+    for colour in colouring.trace_colours(traces):
         r, g, b = style.rgb(colour)
         hue = np.array([r, g, b]) / max(r, g, b)
         pixels = frame.reshape(-1, 3) / np.maximum(frame.reshape(-1, 3).max(axis=1), 1)[:, None]

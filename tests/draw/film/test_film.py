@@ -17,7 +17,7 @@ from helpers.sketch import failed, made
 
 import smc_mujoco as smc
 from smc_mujoco.common import gl, progress
-from smc_mujoco.draw import decimate, states, style
+from smc_mujoco.draw import colouring, decimate, states, style, wording
 from smc_mujoco.draw.film import camera, film, pace, video, world
 from smc_mujoco.draw.film.arrows import (
     Arrow,
@@ -149,7 +149,7 @@ def test_a_failed_machine_turns_grey_stays_where_it_was_and_has_no_goal(monkeypa
     monkeypatch.setattr(Stage, "arrange", arrange)
     before, after, later = pictures([good, failed(bad, 150)], [0.1, 0.2, 0.3])
     assert goals[2:] == [0.0, 0.0, *[0.0, True] * 2]  # after those of the first pose
-    orange = style.law_colour(LAWS[1])
+    orange = colouring.law_colour(LAWS[1])
     assert share(before, orange) > 3e-4
     assert share(after, orange) < 0.2 * share(before, orange)  # brass is left
     right = machines(after).shape[1] // 2
@@ -351,7 +351,7 @@ def test_an_arrow_longer_than_the_longest_has_its_number_and_others_have_none(hi
     acting = loads(hit, edges)
     cut = [arrow.words for arrow in arrows(acting, 0, 0, scale, "#0072B2") if abs(arrow.high) > 1]
     (size,) = np.abs(acting["reaction"].mean[0])
-    assert cut == [f"{style.short(float(size))} N"]
+    assert cut == [f"{wording.short(float(size))} N"]
     assert not any(arrow.words for arrow in arrows(acting, 2, 0, scale, "#0072B2"))
 
 
@@ -400,7 +400,7 @@ def test_a_set_point_is_no_arrow_and_without_a_law_the_servo_is_named(tmp_path):
         run = dataclasses.replace(run, applied=np.full_like(run.u, 0.4))
         (scale,) = scales([run]).values()
         control.append(scale.control)
-        names += style.labels([run], None)
+        names += wording.labels([run], None)
     assert control == [0.4, 0.0]
     assert names == ["No control", "Servo alone"]
 

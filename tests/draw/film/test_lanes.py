@@ -13,7 +13,7 @@ from helpers.sketch import made
 from matplotlib.figure import Figure
 
 import smc_mujoco as smc
-from smc_mujoco.draw import lanes, panels, style
+from smc_mujoco.draw import lanes, panels, shared_axes, style
 
 SIZE = (1280, 720)
 LAWS = ("observer_free", "classical", "adaptive")
@@ -63,7 +63,7 @@ def test_a_law_that_switches_in_few_samples_has_a_lane():
             duration=1.0,
         )
     )
-    (group,) = style.split([run])
+    (group,) = shared_axes.split([run])
     runs = []
     for rate in (90.0, 3.0):
         runs.append(dataclasses.replace(run, u=np.sign(np.sin(rate * run.t))[:, None]))
@@ -118,7 +118,7 @@ def test_a_brief_peak_is_told_and_leaves_room_for_what_lasts(peak, top, said):
     trace = swinging("classical", 1.0)
     u = np.abs(trace.u)
     u[5] = peak
-    (group,) = style.split([trace])
+    (group,) = shared_axes.split([trace])
     panel = panels.Panel("largest", group, [dataclasses.replace(trace, u=u)])
     ax = Figure().add_subplot(ylim=(0.0, 7.0))
     lanes.cut_peak(ax, panel)

@@ -10,7 +10,7 @@ import pytest
 from helpers.sketch import failed, made
 
 import smc_mujoco as smc
-from smc_mujoco.draw import states, style
+from smc_mujoco.draw import states, timed_events
 from smc_mujoco.draw.film import pace
 
 pytestmark = pytest.mark.quick
@@ -105,7 +105,7 @@ def test_impacts_are_slowest(monkeypatch):
 
 
 def test_frames_whose_middle_is_near_that_of_a_push_are_slowest(base, monkeypatch):
-    monkeypatch.setattr(style, "pushes", lambda runs: [SimpleNamespace(time=2.0, width=0.1)])
+    monkeypatch.setattr(timed_events, "pushes", lambda runs: [SimpleNamespace(time=2.0, width=0.1)])
     grid, grid_speeds = pace.speeds([moving(base, np.zeros_like)], FPS)
     # of middles 2.017, 2.05 and 2.083 s
     assert (FPS * grid[grid_speeds == 0.125]).round().tolist() == [60, 61, 62]

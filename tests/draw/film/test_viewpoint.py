@@ -7,7 +7,7 @@ from PIL import Image
 
 import smc_mujoco as smc
 from smc_mujoco.common import gl
-from smc_mujoco.draw import style
+from smc_mujoco.draw import lettering
 from smc_mujoco.draw.film import arrows, camera, flat_arrows, puppet, sheet, world
 
 renders = pytest.mark.skipif(gl.missing() is not None, reason=str(gl.missing()))
@@ -127,7 +127,7 @@ def test_a_machine_is_lit_alike_from_every_side():
 def test_a_chart_keeps_the_unit_of_a_joint_with_a_long_name():
     words = sheet.joint_shortened("shoulder_pan_joint x (rad)", 200.0, 16.0)
     assert words.endswith("… x (rad)")
-    assert style.width(words, 16.0) <= 200.0
+    assert lettering.width(words, 16.0) <= 200.0
     assert sheet.joint_shortened("elbow x (rad)", 200.0, 16.0) == "elbow x (rad)"
 
 

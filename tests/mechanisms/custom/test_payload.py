@@ -10,7 +10,7 @@ import pytest
 from helpers.machine_logs import log, sines
 
 import smc_mujoco as smc
-from smc_mujoco.draw import style
+from smc_mujoco.draw import wording
 
 FREE = 'contype="0" conaffinity="0"'
 ARM = f"""<mujoco model="carrier"><compiler angle="radian"/><worldbody><body name="upper">
@@ -90,9 +90,9 @@ def test_figures_tell_a_run_with_a_payload_from_one_without(arm):
     cases = {"empty": {}, "loaded": {"hand.payload": 0.4}, "heavy": {"mass": 1.2}}
     runs = [smc.Scenario(plant=arm, mismatch=mismatch, **RUN) for mismatch in cases.values()]
     empty, loaded, heavy = smc.run(runs)
-    differences = [style.differences(trace, [empty, loaded]) for trace in (empty, loaded)]
+    differences = [wording.differences(trace, [empty, loaded]) for trace in (empty, loaded)]
     assert differences == ["", "hand.payload = 0.4"]
-    assert "hand.payload = 0.4" in style.differences(loaded, [loaded, heavy])
+    assert "hand.payload = 0.4" in wording.differences(loaded, [loaded, heavy])
 
 
 COMPENSATED = """<mujoco model="rz"><compiler angle="radian"/><worldbody>
