@@ -70,19 +70,6 @@ class Boards(Answer, list[Board]):
         return won
 
     @property
-    def order(self) -> list[str]:
-        """All laws, by the number of their runs without a value, then by mean rank over all
-        blocks.
-        """
-        standing: dict[str, tuple[int, float]] = {}
-        for board in self:
-            for entry in board.entries:
-                failed, rank = standing.get(entry.law, (0, 0.0))
-                rank += entry.rank.mean * len(board.blocks)
-                standing[entry.law] = failed + entry.failed, round(rank, 9)
-        return sorted(standing, key=lambda law: (standing[law], law))
-
-    @property
     def screen(self) -> Screen:
         """The answer: a block for each plant and condition."""
         compared = contests(self, {}, ())
