@@ -80,7 +80,7 @@ class Machines:
         front = self.turn[:, 2]
         self.mounts = []
         for mount in arrow_lines.mounts(
-            first, joints.tolist(), slides.tolist(), puppet.rail, front
+            first.plant, self.model, joints.tolist(), slides.tolist(), puppet.rail, front
         ):
             radius = min(mount.radius, arrow_lines.BENT_SIZE * own / len(joints) ** 0.5)
             if first.plant.has_path:  # an arm of the library, where a film writes numbers
