@@ -295,6 +295,7 @@ def test_every_format_has_the_units_of_each_column(tmp_path):
 def test_parquet_holds_every_number_to_the_last_bit_and_the_scenario(traces, tmp_path):
     trace = traces["network"]
     table = parquet.read_table(trace.export(tmp_path / "a.parquet"))
+    assert table.column_names == list(trace.columns())
     rows = list(trace)  # as pandas.DataFrame(trace) reads it
     for column, expected in trace.columns().items():
         np.testing.assert_array_equal([row[column] for row in rows], expected)
