@@ -2,12 +2,13 @@
 
 import itertools
 import shlex
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from contextvars import ContextVar
 
 PROGRAM = "smc-mujoco"
 ARGUMENTS = {"condition": "conditions", "law": "laws"}  # an option -> its argument in Python
 _typed: ContextVar[tuple[str, ...]] = ContextVar("typed", default=())
+_flags: ContextVar[frozenset[str]] = ContextVar("flags", default=frozenset())
 _doubted: ContextVar[str] = ContextVar("doubted", default="")
 
 
@@ -15,6 +16,11 @@ def remember(words: Sequence[str]) -> None:
     """Remember the words of a command line, without the program's name."""
     _typed.set(tuple(words))
     _doubted.set("")
+
+
+def remember_flags(flags: Iterable[str]) -> None:
+    """Remember the options of the command that take no value."""
+    _flags.set(frozenset(flags))
 
 
 def doubt(sentence: str) -> None:
@@ -65,9 +71,10 @@ def instead(command: str, options: Options, shared: Sequence[str] = ()) -> str:
     words = command.split()
     for i, word in enumerate(words_typed[1:], 1):
         if not word.startswith("-"):
-            if not words_typed[i - 1].startswith("-"):
+            before = words_typed[i - 1]
+            if not before.startswith("-") or before in _flags.get():
                 words.append(word)
-            elif words_typed[i - 1] in shared:
+            elif before in shared:
                 words += words_typed[i - 1 : i + 1]
         elif "=" in word and word.partition("=")[0] in shared:
             words.append(word)

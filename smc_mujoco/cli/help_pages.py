@@ -6,6 +6,8 @@ from typing import Any
 
 from typer.core import TyperCommand, TyperOption
 
+from smc_mujoco.answers import command
+
 ALL = "--help-all"
 ASKED, GAINS, OUTPUT, RARE = "What is asked", "Runs and gains", "Output", "Rarely used"
 # option -> its group; the others are of what is asked
@@ -22,6 +24,15 @@ _wants_all: ContextVar[bool] = ContextVar("wants_all", default=False)
 
 class GroupedCommand(TyperCommand):
     """A command whose help has groups of options, if these are many."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Parse the words of the command line, and remember which options take no value."""
+        flags: list[str] = []
+        for param in self.get_params(ctx):
+            if getattr(param, "is_flag", False):
+                flags += [*param.opts, *param.secondary_opts]
+        command.remember_flags(flags)
+        return super().parse_args(ctx, args)
 
     def get_params(self, ctx: Any) -> list[Any]:
         """Return the options and arguments, each option with its group."""

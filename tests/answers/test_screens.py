@@ -7,12 +7,14 @@ from typing import Any
 
 import numpy as np
 import pytest
+import typer
 
 import smc_mujoco as smc
 from smc_mujoco.analysis.tuning.result import Tuned
 from smc_mujoco.answers import answers, command
 from smc_mujoco.answers.facts import Fact, Lead, NextStep, Screen, Settles, Span
 from smc_mujoco.answers.templates import as_text, is_said, said
+from smc_mujoco.cli import main
 from smc_mujoco.robustness.margins import Margin, Margins
 from smc_mujoco.robustness.sensitivity import Sensitivity
 from smc_mujoco.robustness.worst_case import WorstCase, WorstCases
@@ -188,3 +190,14 @@ def test_a_doubtful_value_is_the_next_step_and_a_command_does_not_repeat_it():
     finally:
         command.remember([])
     assert "makes more" in answers.next_step(NextStep(command.again({}), "makes more"))[1]
+
+
+@pytest.mark.parametrize("words", ["margins --quick duffing", "margins duffing --quick"])
+def test_another_command_keeps_what_stands_behind_an_option_without_a_value(words):
+    name, *rest = words.split()
+    command.remember([name, *rest])
+    try:
+        typer.main.get_command(main.app).commands[name].make_context(name, rest)
+        assert command.instead("worst", {}, ("--law",)) == "smc-mujoco worst duffing"
+    finally:
+        command.remember([])
