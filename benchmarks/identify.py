@@ -30,7 +30,7 @@ from smc_mujoco.identification.own_rig import own_rig
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 from helpers.machine_logs import chain, chirp, log, sines, stairs
-from helpers.public_logs import double_pendulum, double_pendulum_log, pendulum, pendulum_log
+from public_logs import double_pendulum, double_pendulum_log, pendulum, pendulum_log
 
 NO_CONTACT = 'contype="0" conaffinity="0"'
 CART = f"""<mujoco model="cart"><compiler angle="radian"/><worldbody><body name="cart">

@@ -31,7 +31,7 @@ from smc_mujoco.common.errors import ScenarioError, find, items_of, number, show
 from smc_mujoco.common.files import as_path, replacing
 from smc_mujoco.control.from_text import law as find_law
 from smc_mujoco.control.law import Law
-from smc_mujoco.identification import gauss_newton
+from smc_mujoco.identification import gauss_newton, inverse_dynamics
 from smc_mujoco.identification.lack_of_fit import lack_of_fit
 from smc_mujoco.identification.log_rig import LogPart
 from smc_mujoco.identification.own_rig import OwnRig, own_rig
@@ -411,22 +411,15 @@ def largest_size(
 def motion_forces(rig: OwnRig, positions: Array, step: float) -> Array:
     """Return the forces of the driven joints in a motion, (driven, K'), every tenth sample."""
     plant = rig.numbers_of(Values(**rig.values))["plant"]
-    model = plant.load()
-    data = mujoco.MjData(model)
-    places = model.jnt_qposadr[joint_ids(model)]
-    dofs = dof_ids(model)
     driven = len(positions)
     v = np.gradient(positions, step, axis=1)
     a = np.gradient(v, step, axis=1)
-    data.qpos[places] = plant.rest or (0.0,) * plant.n
-    forces = []
-    for k in range(0, positions.shape[1], FORCE_STRIDE):
-        data.qpos[places[:driven]] = positions[:, k]
-        data.qvel[dofs[:driven]] = v[:, k]
-        data.qacc[dofs[:driven]] = a[:, k]
-        mujoco.mj_inverse(model, data)
-        forces.append(data.qfrc_inverse[dofs[:driven]].copy())
-    return np.array(forces).T
+    count = len(positions[0, ::FORCE_STRIDE])
+    motion = np.zeros((3, count, plant.n))
+    motion[0] = plant.rest or (0.0,) * plant.n
+    for of_motion, of_driven in zip(motion, (positions, v, a), strict=True):
+        of_motion[:, :driven] = of_driven[:, ::FORCE_STRIDE].T
+    return inverse_dynamics.forces(plant, *motion)[:, :driven].T
 
 
 def _motions(

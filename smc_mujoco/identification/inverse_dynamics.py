@@ -112,21 +112,27 @@ def torques(plant: Plant, data: Record, columns: Columns, cutoff: float = CUTOFF
     inverse dynamics.
     """
     filtered = Filter(data, columns, cutoff)
+    needed = forces(plant, *filtered.motion(columns.x))
+    torque_columns = {}
+    for i, name in enumerate(columns.torque):
+        torque_columns[name] = filtered.low(needed[:, i])
+    return torque_columns
+
+
+def forces(plant: Plant, x: Array, v: Array, a: Array) -> Array:
+    """Return the forces of a plant's channels in a motion: positions, speeds and accelerations,
+    (N, n) each.
+    """
     model = plant.load()
     state = mujoco.MjData(model)
     state.qpos[:] = initial_pose(model)  # of joints that are held
-    joints = joint_ids(model)
+    places = model.jnt_qposadr[joint_ids(model)]
     dofs = dof_ids(model)
-    x, v, a = filtered.motion(columns.x)
-    forces = np.empty_like(x)
-    places = model.jnt_qposadr[joints]
+    needed = np.empty_like(x)
     for k in range(len(x)):
         state.qpos[places] = x[k]
         state.qvel[dofs] = v[k]
         state.qacc[dofs] = a[k]
         mujoco.mj_inverse(model, state)
-        forces[k] = state.qfrc_inverse[dofs]
-    torque_columns = {}
-    for i, name in enumerate(columns.torque):
-        torque_columns[name] = filtered.low(forces[:, i])
-    return torque_columns
+        needed[k] = state.qfrc_inverse[dofs]
+    return needed
