@@ -4,7 +4,9 @@ numbers.
 
 import contextlib
 import dataclasses
+import hashlib
 import io
+import json
 from pathlib import Path
 
 import pytest
@@ -12,6 +14,7 @@ import pytest
 import smc_mujoco as smc
 from smc_mujoco.cli import run_scene as show
 from smc_mujoco.common.scripts import execute
+from smc_mujoco.control import gain_sets
 from smc_mujoco.draw import page
 from smc_mujoco.simulation.conditions import NAMED
 from smc_mujoco.simulation.suite_conditions import REAL
@@ -231,103 +234,7 @@ PLANTS = {
         (0.8, -0.4, 0.6, -0.2, 0.5),
     ),
 }
-GAINS = {
-    "inverted_pendulum": {
-        "observer_free": {"lam": 4.364, "k1": 9.708},
-        "classical": {"k": 1.945, "c": 12.0},
-        "boundary_layer": {"k": 6.0, "c": 9.06, "phi": 2.096},
-        "adaptive": {"gamma": 104.7, "c": 12.0, "k0": 0.0},
-        "adaptive_leak": {
-            "gamma": 20.31,
-            "c": 12.0,
-            "leak": 8.865,
-            "deadzone": 0.2114,
-            "k0": 0.0,
-        },
-        "super_twisting": {
-            "k1": 2.489,
-            "k2": 16.92,
-            "c": 10.04,
-            "w_max": 6.0,
-        },
-    },
-    "van_der_pol": {
-        "observer_free": {"lam": 6.0, "k1": 1.976},
-        "classical": {"k": 6.0, "c": 2.849},
-        "boundary_layer": {"k": 5.763, "c": 2.768, "phi": 0.01578},
-        "adaptive": {"gamma": 66.11, "c": 2.853, "k0": 0.0},
-        "adaptive_leak": {
-            "gamma": 7.738,
-            "c": 2.821,
-            "leak": 0.9379,
-            "deadzone": 0.03367,
-            "k0": 0.0,
-        },
-        "super_twisting": {
-            "k1": 4.567,
-            "k2": 45.47,
-            "c": 2.16,
-            "w_max": 6.0,
-        },
-    },
-    "duffing": {
-        "observer_free": {"lam": 6.0, "k1": 3.076},
-        "classical": {"k": 3.91, "c": 3.576},
-        "boundary_layer": {"k": 6.0, "c": 3.975, "phi": 0.5429},
-        "adaptive": {"gamma": 600.0, "c": 4.371, "k0": 0.0},
-        "adaptive_leak": {
-            "gamma": 13.87,
-            "c": 4.256,
-            "leak": 2.979,
-            "deadzone": 0.009447,
-            "k0": 0.0,
-        },
-        "super_twisting": {
-            "k1": 8.073,
-            "k2": 0.3443,
-            "c": 4.061,
-            "w_max": 6.0,
-        },
-    },
-    "pendulum_network": {
-        "observer_free": {"lam": 2.922, "k1": 6.19},
-        "classical": {"k": 0.9747, "c": 5.944},
-        "boundary_layer": {"k": 6.0, "c": 6.705, "phi": 2.577},
-        "adaptive": {"gamma": 1.294, "c": 6.718, "k0": 0.0},
-        "adaptive_leak": {
-            "gamma": 24.32,
-            "c": 9.468,
-            "leak": 9.259,
-            "deadzone": 0.3184,
-            "k0": 0.0,
-        },
-        "super_twisting": {
-            "k1": 1.87,
-            "k2": 1.145,
-            "c": 6.256,
-            "w_max": 6.0,
-        },
-    },
-    "inverted_pendulum_network": {
-        "observer_free": {"lam": 3.961, "k1": 9.362},
-        "classical": {"k": 1.73, "c": 11.11},
-        "boundary_layer": {"k": 6.0, "c": 8.705, "phi": 2.328},
-        "adaptive": {"gamma": 2.189, "c": 9.408, "k0": 0.0},
-        "adaptive_leak": {
-            "gamma": 28.47,
-            "c": 11.36,
-            "leak": 11.46,
-            "deadzone": 0.153,
-            "k0": 0.0,
-        },
-        "super_twisting": {
-            "k1": 1.95,
-            "k2": 1.057,
-            "c": 9.086,
-            "w_max": 6.0,
-        },
-    },
-}
+GAINS = json.loads((Path(gain_sets.__file__).parent / "tuned_gains" / "study.json").read_text())
 
 
 def stated(plant: str, condition: str) -> dict:
@@ -338,6 +245,11 @@ def stated(plant: str, condition: str) -> dict:
             "jump": smc.Jump(time=5.0, factors=JUMPS[condition][plant]),
         }
     return COMMON | CONDITIONS[condition]
+
+
+def test_the_gains_of_the_study_are_never_changed():
+    text = json.dumps(GAINS, sort_keys=True)
+    assert hashlib.sha256(text.encode()).hexdigest()[:16] == "98f6b432998cb8c0"
 
 
 def test_the_study_has_these_conditions_and_no_other():
