@@ -44,7 +44,7 @@ DELAY_MOVES = -8e-3, -4e-3, -2e-3, -1e-3, 1e-3, 2e-3, 4e-3, 8e-3
 SPRING_FACTORS = 0.1, 0.2, 0.35, 0.6, 0.8, 1.25, 1.7, 3.0, 5.0, 10.0
 # s, of a spring's damping over its stiffness, that are tried with these; None: the present damping
 SPRING_DAMPINGS = None, 3e-4, 1e-3, 3e-3  # chosen
-FLANK_STEPS = 4  # of the states at the starts, from a flank of a play; chosen
+FLANK_STEPS = 8  # of the states at the starts, from a flank of a play; chosen
 LEAST_DELAY_MOVE = 2.5e-4  # s, at the solution; chosen
 BETTER = 3.0  # deviations of noise, by which another delay must fit better there; chosen
 MOST_DELAYS = 3  # other delays, at most, from which a search starts again; chosen
@@ -69,21 +69,11 @@ def search(
     if (delayed := _other_delay(replays, first, LAST_CHANGE)) is not None:
         first = replays.slopes(delayed, central=False)
     if starts == 1:
-        best = refine(replays, first, most, tolerance, rough=True)
-        for _ in range(MOST_DELAYS):
-            point = (
-                _other_spring(replays, best)
-                or _other_flanks(replays, best)
-                or _other_delay(replays, best, SMALL_CHANGE)
-            )
-            if point is None:
-                break
-            slopes = replays.slopes(point, central=False)
-            tried = refine(replays, slopes, most, tolerance, rough=True)
-            if tried.cost >= best.cost:
-                break
-            best = tried
-        return best
+        reached = [_searched(replays, first, most, tolerance)]
+        if (begun := _other_flanks(replays, first)) is not None:
+            slopes = replays.slopes(begun, central=False)
+            reached.append(_searched(replays, slopes, most, tolerance))
+        return min(reached, key=lambda slopes: slopes.cost)
     steps = min(most, ROUGH_STEPS)
     reached = [refine(replays, first, steps, tolerance, rough=True)]
     if reached[-1].fit < GOOD_FIT:
@@ -94,6 +84,27 @@ def search(
                 break
     best = min(reached, key=lambda slopes: slopes.cost)
     return refine(replays, best, most, tolerance, rough=True)
+
+
+def _searched(replays: Replays, first: Slopes, most: int, tolerance: float) -> Slopes:
+    """Return the slopes at the least squares near others, also beyond the valleys of the cost that
+    springs, plays and delays make.
+    """
+    best = refine(replays, first, most, tolerance, rough=True)
+    for _ in range(MOST_DELAYS):
+        point = (
+            _other_spring(replays, best)
+            or _other_flanks(replays, best)
+            or _other_delay(replays, best, SMALL_CHANGE)
+        )
+        if point is None:
+            break
+        slopes = replays.slopes(point, central=False)
+        tried = refine(replays, slopes, most, tolerance, rough=True)
+        if tried.cost >= best.cost:
+            break
+        best = tried
+    return best
 
 
 def _other_spring(replays: Replays, slopes: Slopes) -> Point | None:
@@ -138,18 +149,14 @@ def _other_flanks(replays: Replays, slopes: Slopes) -> Point | None:
         replays.whole,
         replays.kept,
     )
-    states = slopes.point.states.copy()
-    costs = [cost([r]) for r in slopes.residuals]
-    for side in (-1.0, 1.0):
-        begun = starts.at_flanks(starts.start, side)
-        reached = refine(starts, starts.slopes(begun), FLANK_STEPS, SMALL_CHANGE)
-        for k, r in enumerate(reached.residuals):
-            if cost([r]) < costs[k]:
-                costs[k] = cost([r])
-                states[k] = reached.point.states[k]
-    if sum(costs) >= (1.0 - LAST_CHANGE) * slopes.cost:
-        return None
-    return Point(slopes.point.values, states)
+    indices = range(len(starts.pieces))
+    begun = _fitted_from(starts, slopes, _flanks(starts), FLANK_STEPS, indices)
+    return None if begun.cost >= (1.0 - LAST_CHANGE) * slopes.cost else begun.point
+
+
+def _flanks(replays: Replays) -> list[Point]:
+    """Return points with the rotor of each play at both flanks of it, and in its middle."""
+    return [replays.at_flanks(replays.start, side) for side in (-1.0, 0.0, 1.0)]
 
 
 def _left(slopes: Slopes, rows: list[Array]) -> float:
@@ -226,7 +233,7 @@ def extrapolated(replays: Replays, slopes: Slopes, most: int = 0) -> tuple[Slope
     ends, by_half, by_quarter = _without_steps(replays, slopes, slopes.residuals)
     if _solved(replays, slopes).cost < _solved(replays, ends).cost:
         return _solved(replays, refine(replays, slopes, most)), _moves(slopes, by_half)
-    moved = LEFT_BY_STEPS * _moves(slopes, by_quarter)
+    moved = _left_by_steps(replays, slopes, by_half, by_quarter)
     if not most:
         return _solved(replays, ends), moved
     # these hardly depend on the numbers
@@ -246,8 +253,21 @@ def extrapolated(replays: Replays, slopes: Slopes, most: int = 0) -> tuple[Slope
         ends = dataclasses.replace(ends, point=delayed)
         k = replays.names.index(DELAY)
         moved[k] = max(moved[k], LEAST_DELAY_MOVE / replays.scales[k])
-    ends, _, by_quarter = _without_steps(replays, ends, full)
-    return _solved(replays, ends), np.maximum(moved, LEFT_BY_STEPS * _moves(slopes, by_quarter))
+    ends, *changes = _without_steps(replays, ends, full)
+    return _solved(replays, ends), np.maximum(moved, _left_by_steps(replays, slopes, *changes))
+
+
+def _left_by_steps(
+    replays: Replays, slopes: Slopes, by_half: list[Array], by_quarter: list[Array]
+) -> Array:
+    """Return about how far a solution that is extrapolated to steps of 0 is off, (p,).
+
+    Real flanks of a play give way, as those of replays do with steps h, and hardly with steps of 0.
+    So of a play all that the steps change counts.
+    """
+    if replays.plays.any():
+        return _moves(slopes, by_half)
+    return LEFT_BY_STEPS * _moves(slopes, by_quarter)
 
 
 def _settled(replays: Replays, slopes: Slopes, most: int) -> Slopes:
@@ -323,26 +343,39 @@ def fit_starts(replays: Replays, most: int) -> Slopes:
     are fitted.
 
     A joint that dry friction holds at a start has no slope there. So a piece that does not fit well
-    is also fitted from other velocities, and keeps the best.
+    is also fitted from other velocities, and keeps the best. So it is with where a rotor is in its
+    play.
     """
     reached = _own_starts(replays, replays.start, most)
-    residuals = list(reached.residuals)
+    if replays.plays.any():
+        reached = _fitted_from(replays, reached, _flanks(replays), most, range(len(replays.pieces)))
     allowed = (1.0 - GOOD_PIECE / 100.0) ** 2 * reached.columns * reached.records
-    samples = sum(map(len, residuals))
+    samples = sum(map(len, reached.residuals))
     hard = []
-    for k, r in enumerate(residuals):
+    for k, r in enumerate(reached.residuals):
         if len(replays.free) and cost([r]) > allowed * len(r) / samples:
             hard.append(k)
-    trial = replays.only(hard)
-    states = reached.point.states.copy()
+    kicked = []
     for velocity in KICKS if hard else ():
-        kicked = trial.start
-        kicked.states[:, -len(replays.twin.columns.x) :] += velocity
-        kicked_fit = _own_starts(trial, kicked, most)
-        for i, k in enumerate(hard):
-            if cost([kicked_fit.residuals[i]]) < cost([residuals[k]]):
-                residuals[k] = kicked_fit.residuals[i]
-                states[k] = kicked_fit.point.states[i]
+        kicked.append(replays.start)
+        kicked[-1].states[:, -len(replays.twin.columns.x) :] += velocity
+    return _fitted_from(replays.only(hard), reached, kicked, most, hard)
+
+
+def _fitted_from(
+    replays: Replays, reached: Slopes, points: Sequence[Point], most: int, indices: Sequence[int]
+) -> Slopes:
+    """Return slopes of which some pieces, those of the replays, have the best that they or fits of
+    their states from other points reach.
+    """
+    residuals = list(reached.residuals)
+    states = reached.point.states.copy()
+    for point in points:
+        tried = _own_starts(replays, Point(point.values, point.states[indices]), most)
+        for i, k in enumerate(indices):
+            if cost([tried.residuals[i]]) < cost([residuals[k]]):
+                residuals[k] = tried.residuals[i]
+                states[k] = tried.point.states[i]
     point = Point(reached.point.values, states)
     return dataclasses.replace(reached, point=point, residuals=residuals)
 

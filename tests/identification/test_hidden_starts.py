@@ -243,6 +243,19 @@ def test_a_rotor_that_starts_on_the_wrong_flank_of_its_play_is_tried_on_the_othe
     assert reached.cost < 1.1 * right.cost
 
 
+@pytest.mark.parametrize("side", ["motor", "link"])
+def test_a_piece_that_begins_in_the_middle_of_a_play_is_fitted_from_there(arm, side):
+    """From the flanks its fit was 91 and 93 %: a play of 0.03 came out as 0.0259 of a motor's log."""
+    sensor = smc.Encoder(8192, side=side)
+    machine = {"plant": arm, "actuator": PLAY, "sensor": sensor, "control_period": 2e-3}
+    motion = smc.Sine(0.5, 2.5) + smc.Sine(0.3, 7.0)
+    law = smc.law("pid", kp=20.0, ki=0.0, kd=1.5)
+    run = smc.run(smc.Scenario(**machine, law=law, reference=motion, duration=0.6))
+    log = {"t": run.t, "x": readings(run, False)[:, 0], "u": run.u[:, 0]}
+    rig = own_rig(smc.Scenario(**machine, law="none"), ["input_delay"])
+    assert gauss_newton.fit_starts(Replays(rig, [], [log], False), 8).fit > 99.5
+
+
 @pytest.mark.parametrize(
     ("side", "beside", "plays"),
     [
