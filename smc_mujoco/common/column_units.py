@@ -92,6 +92,7 @@ def headings(texts: Sequence[str], what: str) -> tuple[list[str], list[float]]:
 def with_unit(name: str, columns: Sequence[str]) -> str:
     """Return the column that has a name and a unit that is not known; "" if there is none."""
     for column in columns:
-        if re.match(rf"{re.escape(name)}\s*[\[(]", column):
+        match = HEADING.fullmatch(column)
+        if match and match["name"] == name and column != name:
             return column
     return ""

@@ -16,6 +16,7 @@ from smc_mujoco.common.aliases import Array
 from smc_mujoco.identification.least_squares import least_squares
 from smc_mujoco.identification.paths import DELAY
 from smc_mujoco.identification.replays import PARTS, Point, Replays, Slopes, cost
+from smc_mujoco.identification.standard_errors import jackknife
 
 START_DECADES = 2.0  # by which a quantity of a further start may differ from the rig's own; chosen
 CANDIDATES = 8  # further starts that are drawn for each one that is refined; chosen
@@ -50,6 +51,9 @@ BETTER = 3.0  # deviations of noise, by which another delay must fit better ther
 MOST_DELAYS = 3  # other delays, at most, from which a search starts again; chosen
 MOST_SLOPES = 3  # how often slopes are taken near the solution, at most; chosen
 ROUGH_STEPS = 8  # steps from each start before the best is chosen; chosen
+CORRECTED_STEPS = 3  # steps after the first halving of the physics step; chosen
+MAX_HALVINGS = 5  # of the physics step in corrected replays; chosen
+NEGLIGIBLE_MOVE = 0.5  # of a standard error, by which a halving may move a quantity; chosen
 # of what halved steps change in an extrapolation: what is then left. Where errors of steps h, h/2
 # and h/4 are random, in proportion to the step, 2 x(h/4) - x(h/2) errs by sqrt(1/2) of those of h,
 # and its change from 2 x(h/2) - x(h) is sqrt(7/2) of them; where they are smooth, 1/3 is left
@@ -307,6 +311,38 @@ def _solved(replays: Replays, slopes: Slopes) -> Slopes:
 def _moves(slopes: Slopes, changes: list[Array]) -> Array:
     """Return how far changes of the residuals of each piece, (N,), move the solution, (p,)."""
     return np.abs(least_squares(slopes.freed_slopes, np.concatenate(slopes.freed(changes))))
+
+
+def accurate(replays: Replays, slopes: Slopes) -> tuple[Slopes, Array]:
+    """Return what a search reaches when its replays are corrected, and how far the last halving
+    moved it, (p,).
+
+    The step is halved until that move is far below the standard errors. Residuals are corrected at
+    each point, because the moments at which dry friction changes its direction move. The
+    derivatives stay those of the first step.
+    """
+    moved = np.zeros(len(replays.names))
+    if not replays.correct(slopes.point, 1):
+        return slopes, moved
+    slopes = replays.sharpened(refine(replays, replays.slopes(slopes.point), CORRECTED_STEPS))
+    for halvings in range(2, MAX_HALVINGS + 1):
+        before = slopes
+        replays.correct(before.point, halvings)
+        (residuals,) = replays.residuals([before.point])
+        slopes = dataclasses.replace(before, residuals=residuals)
+        slopes = slopes.stepped(_moved(replays, slopes, 0.0) - slopes.point.values)
+        moved = np.abs(slopes.point.values - before.point.values)
+        if np.all(moved <= NEGLIGIBLE_MOVE * np.sqrt(np.diag(jackknife(slopes)))):
+            break
+    return slopes, moved
+
+
+def not_worse(replays: Replays, reached: Slopes) -> Slopes:
+    """Return what a search reached, or what the rig's own values lead to if these fit better."""
+    first = replays.slopes(replays.start)
+    if reached.cost <= cost(first.freed(first.residuals)):
+        return reached
+    return min(reached, refine(replays, first, ROUGH_STEPS), key=lambda slopes: slopes.cost)
 
 
 def refine(

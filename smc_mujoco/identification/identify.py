@@ -359,6 +359,7 @@ def identify(
     held_out: Log | None = None,
     columns: Mapping[str, str] | None = None,
     condition: Condition | str | None = None,
+    corrected: bool = False,
     starts: Count = 1,
     seed: Seed = 0,
     most: Count = 30,
@@ -382,10 +383,7 @@ def identify(
         noise; in a file of `Trace.export` it is the true position, but of `smc.measured(trace)`. A
         log has t in s, and x (rad or m) and u (in the unit of the machine's command) of the joint,
         or x_JOINT and u_JOINT of each. u is held from its row to the next: of a log of fewer rows
-        give the mean between them. Replays of an open loop are extrapolated to steps of 0, and a
-        log of a simulation has the errors of its own steps: make it with the integrator RK4 or
-        short steps. MuJoCo's default is Euler, which moved a number by 3.4 of its errors in one log
-        with 1 ms.
+        give the mean between them.
         The time grows with rows and names: 4 s at 1 kHz of two joints take a minute or two.
       names: paths of the numbers: "shoulder.damping", .frictionloss, .armature, .stiffness, .gain,
         .offset, .zero, "input_delay", "hand.payload" of a body, "friction.elbow.kc", and "m" in kg,
@@ -395,6 +393,10 @@ def identify(
       columns: our name of a column -> that of the logs.
       condition: effects that the model lacks: a condition or its text, such as
         "mine: friction=LuGre(0.3, 0.4, 0.1)", whose numbers `names` may find; as in a Scenario.
+      corrected: whether to correct open loops for the errors of the simulation's steps, in several
+        times the time. Without it replays are extrapolated to steps of 0. A log of a simulation
+        has the errors of its own steps: make it with the integrator RK4 or short steps. MuJoCo's
+        default is Euler, which moved a number by 3.4 of its errors in one log with 1 ms.
       starts: number of sets from which the search may start, if the first fits badly: the present
         one, and the best of random ones, which differ from it by up to a factor of 100.
       seed: of these starts. The same seed gives the same result.
@@ -427,7 +429,7 @@ def identify(
             drawn.reached(done, max(expected, AHEAD * done))
 
         replays, slopes, by_steps = _solved(
-            twin, names, data, doubts, starts, seed, most, report, batches
+            twin, names, data, doubts, starts, seed, most, corrected, report, batches
         )
         lacking = lack_of_fit(slopes, twin.lacks(replays, slopes))
         by_model = np.hypot(by_steps, lacking.moved)
@@ -435,12 +437,15 @@ def identify(
     values = twin.in_order(replays.values(slopes.point))
     fitted = twin.with_values(values, "identified from records")
     states = _starting_states(fitted, data, replays, slopes.point)
+    steps = replays.short_steps
+    if steps:
+        fits_before = twin.fits(data, **steps)
     scatter = {}
     if len(data) > 1:
         deviation = between(slopes, [piece.record for piece in replays.pieces]) * replays.scales
         scatter = dict(zip(names, deviation.tolist(), strict=True))
     by_pieces = [] if replays.whole else fits_by_pieces(replays, slopes)
-    predictions = fitted.predictions(data, states=states)
+    predictions = fitted.predictions(data, states=states, **steps)
     checked = None if held_out is None else check(fitted, held_out, columns, batches)
     if batches is not None:
         batches.remove()
@@ -657,6 +662,7 @@ def _solved(
     starts: int,
     seed: int,
     most: int,
+    corrected: bool,
     report: Any,
     batches: KeptReplays | None,
 ) -> tuple[Replays, Slopes, Array]:
@@ -669,21 +675,25 @@ def _solved(
     if doubts and first.fit < 0.0:
         raise ScenarioError(doubts[0])
     check_told_apart(pieces, first)
-    extrapolates = twin.controller is None
+    extrapolates = twin.controller is None and not corrected
     tolerance = gauss_newton.SMALL_CHANGE if extrapolates else gauss_newton.COST_TOLERANCE
     reached = gauss_newton.search(pieces, first, starts, seed, most, tolerance)
     point = pieces.in_order(reached.point)
     pieces.steps = {}
-    if extrapolates:
-        if pieces.slope_steps:
-            (residuals,) = pieces.residuals([reached.point])
-            reached = dataclasses.replace(reached, residuals=residuals)
-            point = gauss_newton.refine(pieces, reached, most, tolerance, rough=True).point
-        else:
-            tolerance = gauss_newton.COST_TOLERANCE
-        reached = pieces.slopes(pieces.in_order(point))
-        reached = gauss_newton.refine(pieces, reached, most, tolerance)
-        return pieces, *gauss_newton.extrapolated(pieces, reached, most)
+    if twin.controller is None:
+        if not corrected:
+            if pieces.slope_steps:
+                (residuals,) = pieces.residuals([reached.point])
+                reached = dataclasses.replace(reached, residuals=residuals)
+                point = gauss_newton.refine(pieces, reached, most, tolerance, rough=True).point
+            else:
+                tolerance = gauss_newton.COST_TOLERANCE
+            reached = pieces.slopes(pieces.in_order(point))
+            reached = gauss_newton.refine(pieces, reached, most, tolerance)
+            return pieces, *gauss_newton.extrapolated(pieces, reached, most)
+        pieces.slope_steps = {}
+        slopes, moved = gauss_newton.accurate(pieces, pieces.slopes(point))
+        return pieces, gauss_newton.not_worse(pieces, slopes), moved
     closed = Replays(twin, names, data, True, report, kept=batches)
     points = [closed.start, Point(point.values, closed.start.states)]
     if len(closed.free):  # a record may begin at rest with a jump of the command
@@ -708,6 +718,7 @@ def _starting_states(
     if replays.closed:
         return [replays.state(point, k) for k in range(len(data))]
     repeats = Replays(fitted, [], data, False, whole=True, kept=replays.kept)
+    repeats.steps = replays.short_steps
     of_records = [piece.record for piece in replays.pieces]
     firsts = list(map(of_records.index, range(len(data))))
     none = np.zeros(0)

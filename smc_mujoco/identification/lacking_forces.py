@@ -128,6 +128,7 @@ def lacking_forces(rig: LogRig, replays: Replays, slopes: Slopes) -> list[Lack]:
             pieces += _slightly_pushed(replays.pieces, [force for _, force in of_pieces], i)
     trial = copy.copy(replays)
     trial.pieces = pieces
+    trial.corrections = None
     longer = rig.long_steps(pieces[0].part)  # pyright: ignore[reportArgumentType]
     trial.steps = replays.steps | longer
     states = np.tile(slopes.point.states, (len(texts) + 1, 1))

@@ -9,10 +9,10 @@ the quantities remain. Source: H. G. Bock, "Recent advances in parameter identif
 for ODE", 1983.
 
 MuJoCo's steps are of first order where there is dry friction or a motor, and their error biases the
-quantities by many standard errors. So replays of measured open loops are extrapolated to steps of 0
-from two runs with steps h and h/2: 2 x(h/2) - x(h). What that changes hardly depends on the
-quantities. So a search keeps that of one point, and simulates its other points with longer steps.
-Derivatives are of longer steps too where dry friction alone asks
+quantities by many standard errors. So replays of measured open loops are corrected by what short
+steps change, which is extrapolated from two runs with steps h and h/2: 2 x(h/2) - x(h). The
+correction hardly depends on the quantities. So a search keeps that of one point, and simulates its
+other points with longer steps. Derivatives are of longer steps too where dry friction alone asks
 for short ones: it makes them rough by as much with either.
 """
 
@@ -39,6 +39,7 @@ from smc_mujoco.identification.records import Record
 from smc_mujoco.identification.rig import Quantity, RecordPart, Rig
 from smc_mujoco.simulation import run_key
 from smc_mujoco.simulation.run import run
+from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
 
 # of a quantity's scale, for central differences; chosen: dry friction makes shorter ones rough
@@ -46,6 +47,9 @@ DIFFERENCE_STEP = 2e-3
 # scale of a state at the start, relative to the standard deviation of its column or rate; chosen
 STATE_SCALE = 0.05
 PARTS = 2.0, 4.0  # of a step, by which replays are extrapolated to steps of 0
+MAX_STEP = 2.5e-4  # s, of RK4 in corrected replays; chosen
+# of that step, for slopes: with dry friction they err by 5 % then, and by up to 45 % before; chosen
+SLOPE_HALVINGS = 2
 # largest residual of a sample, relative to the norm of the record; that of a run that fails
 WORST = 1.0
 # ratio of singular values below which states at the start have no effect of their own
@@ -212,6 +216,7 @@ class Replays:
         self.evaluations = 0
         # integrator and step of replays; none for the scenario's own
         self.steps: Fields = {}
+        self.corrections: list[Record] | None = None  # of each piece; None for none
         # what steps of 0 would change in the residuals of each piece; None for nothing
         self.step_errors: list[Array] | None = None
         self.pieces: list[Piece] = []
@@ -246,6 +251,8 @@ class Replays:
         """Return the replays of some of the pieces alone."""
         subset = copy.copy(self)
         subset.pieces = [self.pieces[k] for k in indices]
+        if self.corrections is not None:
+            subset.corrections = [self.corrections[k] for k in indices]
         if self.step_errors is not None:
             subset.step_errors = [self.step_errors[k] for k in indices]
         return subset
@@ -348,7 +355,45 @@ class Replays:
         else:
             predictions = self._replayed(rigs, points, self.steps)
         self.report(len(points))
+        for by_piece in predictions:
+            for columns, added in zip(by_piece, self.corrections or (), strict=False):
+                for name in columns:
+                    columns[name] = columns[name] + added[name]
         return predictions
+
+    def correct(self, point: Point, halvings: int) -> bool:
+        """Correct later replays by what `halvings` of MAX_STEP change at a point; return whether
+        that is needed.
+        """
+        if self.closed or self.twin.columns.state or self.twin.dynamics is not None:
+            return False  # records of simulated runs have the same errors by steps
+        rig = self.rig(point)
+        if not (plain := rig.repeated(self._part(0))).realistic:
+            return False
+        self.steps = _steps(plain, 0)
+        predictions = []
+        for k in (0, halvings - 1, halvings):
+            predictions += self._replayed([rig], [point], _steps(plain, k))
+        self.corrections = []
+        for plain_steps, coarse, fine in zip(*predictions, strict=True):
+            correction = {}
+            for name in fine:
+                correction[name] = 2.0 * fine[name] - coarse[name] - plain_steps[name]
+            self.corrections.append(correction)
+        return True
+
+    @property
+    def short_steps(self) -> Fields:
+        """Integrator and step of exact replays without corrections; none for the scenario's own."""
+        if not self.corrections:
+            return {}
+        return self.steps | {"physics_step": self.steps["physics_step"] / 2**SLOPE_HALVINGS}
+
+    def sharpened(self, slopes: Slopes) -> Slopes:
+        """Return slopes with derivatives from shorter steps."""
+        with self._stepping(self.short_steps):
+            sharp = self.slopes(slopes.point)
+        return dataclasses.replace(sharp, residuals=slopes.residuals)
 
     @contextlib.contextmanager
     def _stepping(self, steps: Fields) -> Iterator[Fields]:
@@ -360,7 +405,9 @@ class Replays:
     def _replayed(
         self, rigs: Sequence[Rig], points: Sequence[Point], fields: Fields
     ) -> list[list[Record]]:
-        """Return what `predicted` returns; `fields` replace those of the replays' scenarios."""
+        """Return what `predicted` returns, without corrections; `fields` replace those of the
+        replays' scenarios.
+        """
 
         def simulated() -> Batch:
             return self._simulated(rigs, points, fields)
@@ -515,6 +562,20 @@ class Replays:
 def _norm(values: Array) -> float:
     """Return the norm of a column about its mean; 1 for a constant one."""
     return float(np.linalg.norm(values - values.mean())) or 1.0
+
+
+def _steps(scenario: Scenario, halvings: int) -> Fields:
+    """Return integrator and step of a corrected replay.
+
+    RK4 has errors of first order only where dry friction changes its direction. It cannot integrate
+    friction that has a state.
+    """
+    integrator = "RK4"
+    step = scenario.control_period / math.ceil(scenario.control_period / MAX_STEP - 1e-9)
+    if scenario.input_delay or any(part.keeps_state for part in scenario.friction):
+        integrator = scenario.resolved.integrator
+        step = scenario.resolved.physics_step
+    return {"integrator": integrator, "physics_step": step / 2**halvings}
 
 
 def _scale(quantity: Quantity) -> float:

@@ -256,12 +256,12 @@ GIVEN = {  # line -> exit code, what is handed on, printed and left, spaces asid
     ),
     (
         "identify emps a.csv b.csv c.csv --columns x=position --for mass,offset --starts 2 "
-        "--seed 3 --held-out d.csv"
+        "--seed 3 --corrected --held-out d.csv"
     ): (
         0,
         [
             "identify('emps', [Path(a.csv), Path(b.csv), Path(c.csv)], ['mass', 'offset'], "
-            "held_out=Path(d.csv), columns={x: 'position'}, condition=None, starts=2, seed=3",
+            "held_out=Path(d.csv), columns={x: 'position'}, condition=None, corrected=True, starts=2, seed=3",
             *AXIS,
             "fits falls at 8.4 s (whole logs, worst column)",
             "the fit is poor",
@@ -272,7 +272,7 @@ GIVEN = {  # line -> exit code, what is handed on, printed and left, spaces asid
         0,
         [
             "identify('duffing', [Path(a.csv), Path(b.csv)], None, held_out=None, columns=None, "
-            "condition=None, starts=1",
+            "condition=None, corrected=False, starts=1",
             "{twin: {x: 99.04, u: 81.0}}, {x: 'm', u: 'V'}, Path(fit))",
             *AXIS,
             "fits 60.0 %",

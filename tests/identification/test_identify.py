@@ -275,17 +275,17 @@ def test_standard_errors_cover_the_truth_from_any_start(start, seconds):
 
     Seed and bounds were fixed before this record was identified. A quantity lies within four
     standard errors but for 1 in 16,000. The square of a jackknife's error, of n blocks, is the true
-    one times chi squared / (n - 1), and what the extrapolation of steps adds is at most twice that.
+    one times chi squared / (n - 1), and what the steps add is at most half of it.
     """
     record = pushed(2026, seconds)
     rare = math.erfc(4.0 / math.sqrt(2.0))
     axis = smc.plant("servo_axis", **CARRIAGE | start)
-    identified = smc.identify(axis, record, list(CARRIAGE))
+    identified = smc.identify(axis, record, list(CARRIAGE), corrected=True)
     assert min(identified.fits[0].values()) >= min(identified.fits_before[0].values())
     free = standard_errors.BLOCKS[0] - 1
     low, high = np.sqrt(chi2.ppf([rare / 2.0, 1.0 - rare / 2.0], free) / free) * [
         1.0,
-        math.hypot(1.0, 2.0),
+        math.hypot(1.0, 0.5),
     ]
     for (name, truth), least in zip(CARRIAGE.items(), least_errors(record["u"]), strict=True):
         assert abs(identified.values[name] - truth) < 4.0 * identified.errors[name]

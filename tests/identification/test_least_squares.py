@@ -61,6 +61,7 @@ class Curve(Replays):
 
         self.steps = {}
         self.slope_steps = {}
+        self.corrections = None
         self.step_errors = None
         self.closed = False
         self.report = lambda count: None
@@ -73,13 +74,20 @@ class Curve(Replays):
             finer=lambda part, times: part,
         )
         self.replayed = []
+        self.lag = 0.0
 
     @property
     def start(self):
         return Point(np.array(self.first), np.zeros((3, 1)))
 
     def rig(self, point) -> Any:
-        plain = SimpleNamespace(resolved=SimpleNamespace(physics_step=1e-3))
+        plain = SimpleNamespace(
+            realistic=self.lag > 0.0,
+            control_period=1e-3,
+            resolved=SimpleNamespace(physics_step=1e-3),
+            input_delay=0.0,
+            friction=(),
+        )
         return SimpleNamespace(repeated=lambda part: plain)
 
     def _part(self, k) -> Any:
@@ -91,11 +99,13 @@ class Curve(Replays):
         return subset
 
     def _replayed(self, rigs, points, fields):
-        """Return the formula."""
+        """Return the formula, with an error of `lag` times the physics step."""
         self.tried += points
+        self.replayed.append(fields)
+        error = self.lag * fields.get("physics_step", 0.0)
         return [
             [
-                {"y": curves(T[part]) @ point.values + point.states[k]}
+                {"y": curves(T[part]) @ point.values + point.states[k] + error * T[part]}
                 for k, part in enumerate(self.parts)
             ]
             for point in points
@@ -325,6 +335,14 @@ def test_further_starts_are_the_best_of_many_within_ranges():
     assert curve.costs(points).sum(axis=1).tolist() == sorted(costs)[:3]
 
 
+def test_a_solution_that_is_worse_than_the_start_is_not_kept():
+    curve = Curve(start=tuple(TRUE))
+    bad = curve.slopes(Point(np.array([1.5, 3.0]), np.zeros((3, 1))))
+    better = gauss_newton.not_worse(curve, bad)
+    np.testing.assert_allclose(better.point.values, TRUE, atol=1e-6)
+    assert gauss_newton.not_worse(curve, better) is better
+
+
 def test_a_jackknife_leaves_out_one_block_after_the_other():
     curve = Curve(noise=0.05)
     slopes = gauss_newton.refine(curve, curve.slopes(curve.start), 5)
@@ -397,6 +415,52 @@ def test_a_quantity_has_the_scale_of_its_value_or_a_hundredth_of_its_range(
     value, least, most, scale
 ):
     assert replays._scale(Quantity(value, "", "given here", least, most)) == pytest.approx(scale)
+
+
+def test_corrected_replays_have_steps_that_divide_the_period():
+    plain = smc.Scenario(plant="duffing", law=smc.law("pid"), control_period=0.0011)
+    assert replays._steps(plain, 0) == {"integrator": "RK4", "physics_step": pytest.approx(2.2e-4)}
+    assert replays._steps(plain, 2)["physics_step"] == pytest.approx(5.5e-5)
+    even = smc.Scenario(plant="duffing", law=smc.law("pid"), control_period=0.001)
+    assert replays._steps(even, 1)["physics_step"] == pytest.approx(1.25e-4)
+    late = smc.Scenario(
+        plant="duffing",
+        law=smc.law("pid"),
+        input_delay=0.003,
+        friction=smc.hardware.LuGre(0.3, 0.4, 0.01),
+    )
+    assert replays._steps(late, 1)["integrator"] == "implicitfast"
+    assert replays._steps(late, 1)["physics_step"] == late.resolved.physics_step / 2
+
+
+def test_replays_are_corrected_by_what_two_step_sizes_leave():
+    curve = Curve()
+    assert not curve.correct(curve.start, 1)  # an ideal machine's steps do not err
+    assert curve.short_steps == {}
+    exact, curve.lag = curve.predicted([curve.start]), 800.0
+    assert curve.correct(curve.start, 2)
+    assert [columns["physics_step"] for columns in curve.replayed[-3:]] == [
+        2.5e-4,
+        1.25e-4,
+        6.25e-5,
+    ]
+    (predicted,) = curve.predicted([curve.start])
+    for columns, uncorrected in zip(predicted, exact[0], strict=True):
+        np.testing.assert_allclose(columns["y"], uncorrected["y"], atol=1e-12)
+    assert curve.short_steps == {"integrator": "RK4", "physics_step": 6.25e-5}
+    slopes = curve.slopes(curve.start)
+    curve.replayed.clear()
+    sharp = curve.sharpened(slopes)
+    assert {columns["physics_step"] for columns in curve.replayed} == {6.25e-5}
+    assert sharp.residuals is slopes.residuals
+    assert curve.steps == {"integrator": "RK4", "physics_step": 2.5e-4}
+    for closed in (
+        {"closed": True},
+        {"twin": SimpleNamespace(dynamics=None, springs=(), columns=SimpleNamespace(state=("y",)))},
+    ):
+        uncorrected = Curve()
+        vars(uncorrected).update(closed, lag=800.0)
+        assert not uncorrected.correct(uncorrected.start, 1)
 
 
 def test_replays_are_solved_for_steps_of_0_with_the_slopes_of_longer_ones():

@@ -71,6 +71,14 @@ Beside = Annotated[
         "file with one such line. Numbers that --for names are found; others stay as given.",
     ),
 ]
+Corrected = Annotated[
+    bool,
+    typer.Option(
+        "--corrected",
+        help="Halve the simulation's steps until their errors no longer matter, in several times "
+        "the time; by default the result is extrapolated to steps of 0.",
+    ),
+]
 Starts = Annotated[
     int,
     typer.Option(
@@ -121,6 +129,7 @@ def identify(
     condition: Beside = None,
     figure: FoundFigure = None,
     out: FoundFile = None,
+    corrected: Corrected = False,
     starts: Starts = 1,
     seed: StartsSeed = 0,
     full: options.Full = False,
@@ -178,6 +187,7 @@ def identify(
         held_out=held_out,
         columns=renamed,
         condition=condition,
+        corrected=corrected,
         starts=starts,
         seed=seed,
         progress=True,
