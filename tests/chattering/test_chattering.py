@@ -15,7 +15,7 @@ from helpers.runs import at_defaults
 import smc_mujoco as smc
 from smc_mujoco.analysis.differ import relative_range
 from smc_mujoco.analysis.step_halving import StepChange
-from smc_mujoco.chattering.cycle_tables import rows
+from smc_mujoco.chattering.cycle_tables import rows, table
 from smc_mujoco.chattering.harmonics import Loop, Wave, play
 from smc_mujoco.chattering.prediction import (
     Chattering,
@@ -24,6 +24,7 @@ from smc_mujoco.chattering.prediction import (
     switches,
 )
 from smc_mujoco.common.files import plain
+from smc_mujoco.common.tabular import as_cell
 from smc_mujoco.design import chattering
 from smc_mujoco.metrics.limit_cycle import channel_cycle
 
@@ -363,6 +364,19 @@ def test_a_file_of_predictions_has_what_was_predicted_and_measured(snapshot):
     for row in rows([run, run], [sure, possible], measured, changes):
         said.append(json.dumps(plain(row)))
     assert [*said, bool(sure), bool(possible), *(row.marked for row in changes)] == snapshot
+
+
+@pytest.mark.quick
+@pytest.mark.parametrize(("plant", "share"), [("duffing", "1 %"), ("double_pendulum", "30 %")])
+def test_a_table_has_what_was_predicted_beside_what_was_measured(plant, share):
+    run = smc.Scenario(plant=plant, law=smc.law("classical", k=2.0, c=3.0))
+    sizes = {"amplitude": 0.5, "frequency": 20.0, "third_harmonic": 0.01, "coupling": 0.3}
+    ranges = {"amplitude_range": (0.4, 0.6), "frequency_range": (18.0, 21.0)}
+    drawn = table([run], 0, [Chattering(**sizes, **ranges)], [(0.4, 19.0)], [StepChange(0.0, 0.0)])
+    texts = [as_cell(cell).text for cell in drawn.rows[0]]
+    assert texts == ["classical", "0.500", "0.400", "20.0", "19.0", "20 %", share]
+    assert [heading.split()[-2] for heading in drawn.headings[1:3]] == ["predicted", "measured"]
+    assert [heading.split()[0] for heading in drawn.headings[3:5]] == ["predicted", "measured"]
 
 
 class Formula:
