@@ -544,14 +544,14 @@ def test_a_law_that_fails_wins_nothing_and_is_not_better_than_one_that_does_not(
 def test_what_cannot_be_compared_is_refused(refused):
     table = study()
     apart = (table.column("law") == "a") == (table.column("condition") == "nominal")
-    for bad, options in (
-        (table.taken(slice(0, 0)), {}),
-        (table, {"metrics": ["speed"]}),
-        (table, {"by": ("law",)}),
-        (table.taken(np.r_[0:240, 0]), {}),  # a run twice
-        (table.taken(apart), {}),  # no run in common
+    for bad, options, word in (
+        (table.taken(slice(0, 0)), {}, "no runs"),
+        (table, {"metrics": ["speed"]}, "'speed'"),
+        (table, {"by": ("law",)}, "('law',)"),
+        (table.taken(np.r_[0:240, 0]), {}, "several runs"),
+        (table.taken(apart), {}, "in common"),
     ):
-        refused(lambda bad=bad, options=options: leaderboard(bad, **options))
+        refused(lambda bad=bad, options=options: leaderboard(bad, **options), word)
 
 
 @pytest.mark.parametrize(

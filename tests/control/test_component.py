@@ -130,4 +130,4 @@ def test_a_gain_may_have_any_name(gain):
 def test_an_option_of_another_type_is_refused_at_the_decorator(kind, option, value, refused):
     if option == "plants" and (kind is not smc.law_function or isinstance(value, dict)):
         return
-    refused(lambda: kind(gains={"k": 1.0}, **{option: value}))
+    refused(lambda: kind(gains={"k": 1.0}, **{option: value}), option)

@@ -142,15 +142,22 @@ TEXTS = (
     "none.py",
 )
 TEXTS += ("two.py", "mine.json", "notes.txt", "empty.json", "bare.py", ".", "\0", 3)
+# what a sentence names in place of the text: the argument, or the law in a file
+NAMED = {
+    "twisting(r9=5)": "'r9'",
+    "twisting(r1=nan)": "r1 is nan",
+    "mine.json": "law mine of mine.json",
+}
+NAMED |= {"\0": r"'\x00'"}
 GAINS = ("lam", "lam=", "3=4", "lam=x", "a=1,a=2")
 
 
 def test_other_texts_are_one_sentence(files, refused):
     (files / "bare.py").write_text("k = 1\n")
     for text in TEXTS:
-        refused(lambda text=text: smc.law(text))
+        refused(lambda text=text: smc.law(text), NAMED.get(text, text))
     for text in GAINS:
-        refused(lambda text=text: parsed_gains(text, "--set"))
+        refused(lambda text=text: parsed_gains(text, "--set"), f"--set is {text!r}")
     with pytest.warns(smc.errors.GainWarning, match="1/2 < p < 1"):
         component("surface", "terminal(p=2)", surface.catalogue(), "terminal(b=2)")
     assert parsed_gains(" lam=6, k1=3 5,", "--set") == {"lam": 6.0, "k1": (3.0, 5.0)}

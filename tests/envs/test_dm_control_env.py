@@ -274,16 +274,16 @@ class Lost(smc.Signal):
 
 
 def test_bad_input_is_one_sentence(refused):
-    for make in (
-        lambda: suite.load("duffing", "swing_up"),
-        lambda: suite.load("duffing", changes={"noise": smc.Noise(0.1)}),
-        lambda: suite.load("duffing", changes={"u_max": np.inf}),
-        lambda: suite.load("duffing", changes={"reference": smc.Sine(0.1, 1.0)}),
-        lambda: suite.load("duffing", "track", changes={"reference": Lost(1.0)}),
-        lambda: suite.load("duffing", changes=3),
-        lambda: smc.envs.agent("classical", 3),
-    ):
-        refused(make)
+    for word, make in {
+        "'swing_up'": lambda: suite.load("duffing", "swing_up"),
+        "'noise'": lambda: suite.load("duffing", changes={"noise": smc.Noise(0.1)}),
+        "u_max is inf": lambda: suite.load("duffing", changes={"u_max": np.inf}),
+        "'track'": lambda: suite.load("duffing", changes={"reference": smc.Sine(0.1, 1.0)}),
+        "t = 1.001 s": lambda: suite.load("duffing", "track", changes={"reference": Lost(1.0)}),
+        "changes is 3": lambda: suite.load("duffing", changes=3),
+        "environment is 3": lambda: smc.envs.agent("classical", 3),
+    }.items():
+        refused(make, word)
 
 
 def test_an_agent_whose_law_fails_says_so():

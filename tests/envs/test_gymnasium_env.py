@@ -463,16 +463,17 @@ def test_copies_end_after_max_episode_steps():
 def test_bad_input_is_one_sentence(refused):
     many = BatchEnv("duffing", 2)
     many.reset(seed=0)
-    for make in (
-        lambda: PlantEnv("duffing", render_mode="human"),
-        lambda: PlantEnv("duffing").reset(options={"x1": 0.0}),
-        lambda: PlantEnv("duffing").step([0.0, 0.0]),
-        lambda: PlantEnv("duffing").step("left"),
-        lambda: many.step([[1e300], [np.inf]]),
-        lambda: many.reset(seed=[1]),
-        lambda: BatchEnv("duffing", 2, render_mode="rgb_array"),
-        lambda: BatchEnv("duffing", 2).step([[0.0], [0.0]]),
-        lambda: smc.envs.agent("classical", many),
-        lambda: smc.envs.agent("classical", PlantEnv("double_pendulum"))(np.zeros(3)),
-    ):
-        refused(make)
+    of_two_joints = smc.envs.agent("classical", PlantEnv("double_pendulum"))
+    for word, make in {
+        "'human'": lambda: PlantEnv("duffing", render_mode="human"),
+        "'x1'": lambda: PlantEnv("duffing").reset(options={"x1": 0.0}),
+        "shape (1,)": lambda: PlantEnv("duffing").step([0.0, 0.0]),
+        "'left'": lambda: PlantEnv("duffing").step("left"),
+        "shape (2, 1)": lambda: many.step([[1e300], [np.inf]]),
+        "seed has 1": lambda: many.reset(seed=[1]),
+        "'rgb_array'": lambda: BatchEnv("duffing", 2, render_mode="rgb_array"),
+        "reset": lambda: BatchEnv("duffing", 2).step([[0.0], [0.0]]),
+        "BatchEnv": lambda: smc.envs.agent("classical", many),
+        "observation": lambda: of_two_joints(np.zeros(3)),
+    }.items():
+        refused(make, word)

@@ -145,7 +145,7 @@ def test_what_makes_no_law_is_refused_in_a_sentence(source, options, said):
     "source", [Adaptive(), LEAD, Twin(smc.law("pid"), 1e-3, 6.0)], ids=("a", "b", "c")
 )
 def test_a_name_that_is_none_is_refused(source, name, refused):
-    refused(lambda: smc.law_from(source, name=name))
+    refused(lambda: smc.law_from(source, name=name), f"is {name!r}")
 
 
 def test_a_system_that_is_not_linear_is_refused_with_a_cure_that_works(refused):

@@ -189,9 +189,9 @@ def test_what_cannot_be_a_law_is_one_sentence(refused):
         "three matrices": (1, 1, 1),
     }
     for K in wrong.values():
-        refused(lambda K=K: smc.exchange.law_from_control(K))
-    refused(lambda: smc.exchange.law_from_control(LEAD, ["y"]))
-    refused(lambda: smc.exchange.law_from_control(LEAD, name=""))
+        refused(lambda K=K: smc.exchange.law_from_control(K), "K")
+    refused(lambda: smc.exchange.law_from_control(LEAD, ["y"]), "input", "'y'")
+    refused(lambda: smc.exchange.law_from_control(LEAD, name=""), "name", "''")
 
 
 def test_a_discrete_one_runs_at_its_own_period_only():

@@ -315,7 +315,7 @@ def test_the_policy_of_a_model_is_taken_as_it_is_now(torch):
 
 def test_what_is_no_policy_is_one_sentence(refused):
     for act in (3, "net.h5", "net.onnx"):
-        refused(lambda act=act: smc.policy(act))
+        refused(lambda act=act: smc.policy(act), act)
 
 
 class Pair(Module):

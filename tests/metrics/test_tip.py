@@ -191,7 +191,9 @@ def test_contact_forces_end_with_a_failure(pressed, tmp_path, monkeypatch):
 
 def test_contact_forces_are_unknown_behind_parts_with_a_state(pressed, refused):
     for part in (smc.Lag(0.01), smc.Backlash(0.01)):
-        refused(lambda part=part: tip.contacts(changed(pressed, actuator=part)))
+        refused(
+            lambda part=part: tip.contacts(changed(pressed, actuator=part)), type(part).__name__
+        )
         assert set(smc.metrics.tip_scores(changed(pressed, actuator=part))) == {
             "max_error",
             "rms_error",
@@ -245,7 +247,7 @@ def test_hybrid_law_presses_with_its_force_while_the_tip_slides(pressed):
 
 def test_bad_input_is_one_sentence(trace, pressed, refused):
     plain = smc.run(smc.Scenario(plant="duffing", law=smc.law("classical"), duration=0.01))
-    refused(lambda: smc.metrics.tip_scores(plain))
-    refused(lambda: tip.contacts(trace))
-    refused(lambda: smc.score([trace]))
-    refused(lambda: smc.plant_from(arms.ARM, channels=["reach"], tip="tp"))
+    refused(lambda: smc.metrics.tip_scores(plain), "duffing", "tip")
+    refused(lambda: tip.contacts(trace), "contact=")
+    refused(lambda: smc.score([trace]), "score")
+    refused(lambda: smc.plant_from(arms.ARM, channels=["reach"], tip="tp"), "site", "'tip'")

@@ -285,17 +285,19 @@ def test_a_failed_run_is_the_worst():
 
 @pytest.mark.filterwarnings("ignore:input_delay is")
 def test_bad_values_get_a_sentence(refused):
-    for make in (
-        smc.Uncertainty,
-        lambda: smc.Uncertainty(parameters=0.3),
-        lambda: smc.worst_case(
-            scenario(noise=smc.Noise(position_error=smc.Step(0.1))), within=CLASSES["errors"]
+    measured = scenario(noise=smc.Noise(position_error=smc.Step(0.1)))
+    unknown = smc.Uncertainty(parameters={"zz": (1, 2)})
+    for word, make in {
+        "nothing": smc.Uncertainty,
+        "0.3": lambda: smc.Uncertainty(parameters=0.3),
+        "errors": lambda: smc.worst_case(measured, within=CLASSES["errors"]),
+        "'zz'": lambda: smc.worst_case(scenario(), within=unknown),
+        "duration": lambda: smc.worst_case([scenario(), scenario(duration=3.0)]),
+        "friction_scale": lambda: smc.worst_case(
+            scenario(), within=smc.Uncertainty(friction_scale=(0, 2))
         ),
-        lambda: smc.worst_case(scenario(), within=smc.Uncertainty(parameters={"zz": (1, 2)})),
-        lambda: smc.worst_case([scenario(), scenario(duration=3.0)]),
-        lambda: smc.worst_case(scenario(), within=smc.Uncertainty(friction_scale=(0, 2))),
-    ):
-        refused(make)
+    }.items():
+        refused(make, word)
     with pytest.raises(smc.ScenarioError, match=r"\b0\.5\b"):  # s that are left of the run
         smc.worst_case(scenario(input_delay=1.5), within=smc.Uncertainty(delay=(0.0, 1.0)))
 

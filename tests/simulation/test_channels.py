@@ -177,22 +177,20 @@ def test_a_plants_channels_suggest_what_a_scenario_leaves_out():
 
 
 REFUSED = {
-    "no law": lambda: smc.Scenario(**BOTH),
-    "law of one channel alone": lambda: smc.plant_from(
+    "law is None": lambda: smc.Scenario(**BOTH),
+    "'elbow'": lambda: smc.plant_from(
         PENDULUM,
         channels={"shoulder": smc.Channel(motor=True, law="classical"), "elbow": {"motor": True}},
     ),
-    "unknown joint": lambda: smc.Scenario(
-        law={"shoulder": "classical", "elbo": "classical"}, **BOTH
-    ),
-    "missing joint": lambda: smc.Scenario(
+    "'elbo'": lambda: smc.Scenario(law={"shoulder": "classical", "elbo": "classical"}, **BOTH),
+    "joint 'elbow'": lambda: smc.Scenario(
         law=smc.law("classical"), u_max={"shoulder": 2.0}, **BOTH
     ),
-    "joint law in one channel": lambda: smc.Scenario(law=["classical", "unit_vector"], **BOTH),
-    "wrong degree": lambda: smc.Scenario(law=["classical", "twisting"], surface="pid", **BOTH),
+    "unit_vector": lambda: smc.Scenario(law=["classical", "unit_vector"], **BOTH),
+    "relative degree": lambda: smc.Scenario(law=["classical", "twisting"], surface="pid", **BOTH),
 }
 
 
 def test_bad_input_is_one_sentence(refused):
-    for make in REFUSED.values():
-        refused(make)
+    for word, make in REFUSED.items():
+        refused(make, word)

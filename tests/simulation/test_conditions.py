@@ -85,12 +85,13 @@ def test_conditions_add_up(refused):
         "friction": smc.Coulomb(0.1),
     }
     assert find_condition("noise + noise").on(duffing, 4.0) == {"noise": smc.Noise(0.01, 0.05)}
-    refused(lambda: find_condition("light + heavy").on(duffing, 4.0))
+    refused(lambda: find_condition("light + heavy").on(duffing, 4.0), "'heavy'", "mismatch")
     awkward = smc.condition("awkward", input_delay=wild.Awkward())
-    refused(lambda: (awkward + smc.condition("late", input_delay=1e-3)).on(duffing, 4.0))
+    late = smc.condition("late", input_delay=1e-3)
+    refused(lambda: (awkward + late).on(duffing, 4.0), "'late'", "input_delay")
     assert (WORN + find_condition("noise")).on(duffing, 4.0)["noise"] == smc.Noise(0.01, 0.05)
     assert (WORN + "noise").name == "worn gear + noise"
-    refused(lambda: WORN + 3)  # pyright: ignore[reportOperatorIssue]
+    refused(lambda: WORN + 3, "condition is 3")  # pyright: ignore[reportOperatorIssue]
 
 
 def test_a_condition_of_any_values_has_a_text_and_joins_others(refused):
@@ -99,7 +100,7 @@ def test_a_condition_of_any_values_has_a_text_and_joins_others(refused):
     (run,) = smc.grid("duffing", "none", array + smc.condition("again", x0=np.array([0.3])))
     assert run.resolved.x0 == (0.3,)
     odd = smc.condition("odd", noise=np.zeros(1, "f4,i4"))
-    refused(lambda: smc.grid("duffing", "none", odd + find_condition("noise")))
+    refused(lambda: smc.grid("duffing", "none", odd + find_condition("noise")), "both set noise")
 
 
 def test_what_happens_once_does_so_at_half_time():
@@ -107,29 +108,29 @@ def test_what_happens_once_does_so_at_half_time():
 
 
 def test_a_text_that_is_none_is_one_sentence(refused):
-    for text in (
-        "worn: friction=Coulomb(k=3)",
-        "worn: friction=xyzzyx('x')",
-        "worn: friction=().__class__",
-        "worn: friction=[i for i in (1,)]",
-        "worn: friction=Coulomb(0.05",
-        "worn: friction=Coulomb(-'a')",
-        "worn: Coulomb(1)",
-        "worn: **{'a': 1}",
-        "worn: frction=1",
-        "worn: plant='duffing'",
-        "worn:",
-        "worn: x0=1, x0=2",
-        "worn: friction=Coulomb(level=1, level=2)",
-        "worn: mismatch={'mass': 1.3, **{'mass': 2}}",
-        ": input_delay=0.01",
-        "noise: input_delay=0.01",
-        "noisy",
-        "worn friction=Coulomb(0.05)",
-        "noise + ",
-        "a" * 10**5 + ": x=" + "(" * 10**4,
+    for text, word in (
+        ("worn: friction=Coulomb(k=3)", "takes level"),
+        ("worn: friction=xyzzyx('x')", "'xyzzyx'"),
+        ("worn: friction=().__class__", "'().__class__'"),
+        ("worn: friction=[i for i in (1,)]", "'[i for i in (1,)]'"),
+        ("worn: friction=Coulomb(0.05", "'worn: friction=Coulomb(0.05'"),
+        ("worn: friction=Coulomb(-'a')", "value is 'a'"),
+        ("worn: Coulomb(1)", "'worn: Coulomb(1)'"),
+        ("worn: **{'a': 1}", "cannot be read"),
+        ("worn: frction=1", "'frction'"),
+        ("worn: plant='duffing'", "sets plant"),
+        ("worn:", "no fields"),
+        ("worn: x0=1, x0=2", "x0 twice"),
+        ("worn: friction=Coulomb(level=1, level=2)", "level twice"),
+        ("worn: mismatch={'mass': 1.3, **{'mass': 2}}", "**{'mass': 2}"),
+        (": input_delay=0.01", "name is ''"),
+        ("noise: input_delay=0.01", "'noise'"),
+        ("noisy", "'noisy'"),
+        ("worn friction=Coulomb(0.05)", "no colon"),
+        ("noise + ", "condition ''"),
+        ("a" * 10**5 + ": x=" + "(" * 10**4, "aaa..."),
     ):
-        refused(lambda text=text: find_condition(text))
+        refused(lambda text=text: find_condition(text), word)
     refused(lambda: find_condition("worn: input_delay=10ms"), "'10ms'", "without a unit")
     refused(lambda: find_condition("worn: x0=1e3 2"), "friction=Coulomb(0.05)")
 
@@ -144,8 +145,8 @@ def test_a_file_holds_a_condition_a_line(tmp_path, refused):
     path.write_text(f"# of the workshop\n\n{WORN}\nnoise + coulomb\n")
     assert [of_line.name for of_line in from_file(path)] == ["worn gear", "noise + coulomb"]
     path.write_text("# two\n\nworn x0=1\n")
-    refused(lambda: from_file(path))
-    refused(lambda: from_file(tmp_path / "none.txt"))
+    refused(lambda: from_file(path), "line 3", path, "colon")
+    refused(lambda: from_file(tmp_path / "none.txt"), tmp_path / "none.txt")
 
 
 # grids
@@ -162,7 +163,8 @@ def test_a_condition_that_starts_at_0_is_nothing_to_tune_for(refused):
     refused(
         lambda: smc.tune(
             "duffing", "classical", 2, conditions=["nominal", smc.condition("rest", x0=0.0)]
-        )
+        ),
+        "under 'rest'",
     )
 
 
@@ -215,7 +217,7 @@ def test_no_grid_has_the_starts_and_the_noise_of_tuning(refused):
     tuned = {s.seed for s in Objective().scenarios("duffing", smc.law("classical"), 0)}
     assert min(tuned) >= GRID_SEEDS
     assert len(tuned) == 7
-    refused(lambda: smc.grid("duffing", "none", "nominal", [GRID_SEEDS]))
+    refused(lambda: smc.grid("duffing", "none", "nominal", [GRID_SEEDS]), "seed", GRID_SEEDS)
     starts = []
     for s in Objective().scenarios("duffing", smc.law("classical"), 0):
         starts.append(s.resolved.x0[0])
@@ -253,15 +255,20 @@ QUICK = smc.law("classical", k=6.0)
 
 
 def test_grid_refuses_two_things_of_one_name(refused):
-    for changed in [
-        {"laws": [SLOW, QUICK]},
-        {"laws": ["classical", QUICK]},
-        {"plants": ["duffing", smc.plant("duffing", beta=5.0)]},
-        {"conditions": [WORN, smc.condition("worn gear", u_max=3.0)]},
-        {"laws": [pid(k=2.0)]},
+    for changed, *names in [
+        ({"laws": [SLOW, QUICK]}, "laws", "'classical'"),
+        ({"laws": ["classical", QUICK]}, "laws", "'classical'"),
+        ({"plants": ["duffing", smc.plant("duffing", beta=5.0)]}, "plants", "'duffing'"),
+        (
+            {"conditions": [WORN, smc.condition("worn gear", u_max=3.0)]},
+            "conditions",
+            "'worn gear'",
+        ),
+        ({"laws": [pid(k=2.0)]}, "law 'pid'"),
     ]:
         refused(
-            lambda given={"plants": "duffing", "laws": "classical"} | changed: smc.grid(**given)
+            lambda given={"plants": "duffing", "laws": "classical"} | changed: smc.grid(**given),
+            *names,
         )
     assert (
         len(smc.grid(["duffing"] * 2, [SLOW, smc.law("classical", k=2.0), pid().named("my pid")]))
@@ -300,7 +307,8 @@ def test_start_is_set_by_condition_or_starts(refused):
         refused(
             lambda search=search, fields=fields, more=more: search(
                 "duffing", "classical", **fields, **more
-            )
+            ),
+            "'far'",
         )
         assert [
             s.resolved.x0
@@ -311,7 +319,7 @@ def test_start_is_set_by_condition_or_starts(refused):
 def test_grid_asks_where_a_model_at_rest_starts(arm, refused):
     law = smc.law("classical")
     at_rest = smc.starts(x0=0.0)
-    refused(lambda: smc.grid([arm], law, ["noise", "nominal"], 2, starts=at_rest))
+    refused(lambda: smc.grid([arm], law, ["noise", "nominal"], 2, starts=at_rest), "'nominal'")
     moved = smc.condition("a", reference=smc.Step(0.1)), smc.condition("b", v0=0.1)
     moved += (smc.condition("c", feedforward=smc.Step(0.1)),)
     assert len(smc.grid(arm, law, [*moved, "noise", "sine", "encoder"], 2)) == 12
@@ -323,7 +331,9 @@ def test_grid_asks_where_a_model_at_rest_starts(arm, refused):
 
 def test_a_model_is_tuned_in_conditions_of_ones_own(arm, refused):
     at_rest = smc.starts(x0=0.0)
-    refused(lambda: smc.tune(arm, "pid", budget=4, conditions="nominal", starts=at_rest))
+    refused(
+        lambda: smc.tune(arm, "pid", budget=4, conditions="nominal", starts=at_rest), "'nominal'"
+    )
     goal = Objective(conditions=("nominal",), duration=0.5)
     tuned = smc.tune(
         arm,

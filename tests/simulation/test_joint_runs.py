@@ -295,7 +295,11 @@ def test_a_push_gives_its_impulse_to_its_body(refused):
     )
     assert np.abs(trace.v[trace.t < 0.1]).max() == 0.0
     assert trace.v[-1, 0] == pytest.approx(30.0 * 0.02 * 2 / math.pi / 2.0, rel=1e-3)
-    refused(lambda: smc.Scenario(plant=plant, law="none", disturbance=smc.signals.Push("bub")))
+    refused(
+        lambda: smc.Scenario(plant=plant, law="none", disturbance=smc.signals.Push("bub")),
+        "body",
+        "'bub'",
+    )
 
 
 def test_a_failing_law_ends_its_own_run_with_the_reason():
@@ -342,9 +346,7 @@ WELDED = """
 """
 TORQUE = "computed_torque_sliding"
 REFUSED = {
-    "gain of another length": lambda: smc.Scenario(
-        plant="double_pendulum", law=smc.law(TORQUE, k=[1.0, 2.0, 3.0])
-    ),
+    "gain k": lambda: smc.Scenario(plant="double_pendulum", law=smc.law(TORQUE, k=[1.0, 2.0, 3.0])),
     "surface": lambda: smc.Scenario(plant="double_pendulum", law=TORQUE, surface="terminal"),
     "singular": lambda: smc.Scenario(
         plant=smc.plant_from(
@@ -352,7 +354,7 @@ REFUSED = {
         ),
         law=TORQUE,
     ),
-    "welded": lambda: smc.Scenario(
+    "equality constraints": lambda: smc.Scenario(
         plant=smc.plant_from(
             WELDED, channels={n: smc.Channel(motor=True) for n in "ab"}, name="welded"
         ),
@@ -363,5 +365,5 @@ REFUSED = {
 
 @pytest.mark.filterwarnings("ignore:Inertia matrix is too close to singular")
 def test_bad_input_is_one_sentence(refused):
-    for make in REFUSED.values():
-        refused(make)
+    for word, make in REFUSED.items():
+        refused(make, word)

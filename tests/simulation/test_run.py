@@ -309,7 +309,7 @@ def test_the_warning_names_what_does_not_compile_and_why_and_points_at_the_calle
 def test_an_estimator_from_a_file_without_its_code_is_refused(tmp_path, refused):
     mine = smc.estimator_function()(lambda y, gains, memory: y.v)()
     smc.run(scenario(velocity=mine)).save(tmp_path / "a.npz")
-    refused(lambda: smc.run(smc.load(tmp_path / "a.npz").scenario))
+    refused(lambda: smc.run(smc.load(tmp_path / "a.npz").scenario), "estimator", "code")
 
 
 # the process around it

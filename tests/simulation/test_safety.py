@@ -843,7 +843,7 @@ def test_memory_that_runs_out_is_said_in_one_sentence(monkeypatch, refused):
         runs_out = mock.Mock(side_effect=error)
         with monkeypatch.context() as patch:
             patch.setattr(RUN, "ScenarioBatch", runs_out)
-            refused(lambda: smc.run([scenario(), scenario(seed=1)]))
+            refused(lambda: smc.run([scenario(), scenario(seed=1)]), "no memory for 2 runs")
 
 
 @pytest.mark.skipif(not hasattr(ctypes.CDLL(None), "malloc_trim"), reason="not glibc")

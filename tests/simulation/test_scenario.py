@@ -237,12 +237,16 @@ def test_an_error_of_measurement_is_a_known_signal(refused):
         Relay(1.0),
         PerChannel((COME,)),
     ):
-        refused(lambda error=error: smc.Noise(velocity_error=error))
-        refused(lambda error=error: smc.Noise(position_error=error))
+        refused(
+            lambda error=error: smc.Noise(velocity_error=error), "error is", type(error).__name__
+        )
+        refused(
+            lambda error=error: smc.Noise(position_error=error), "error is", type(error).__name__
+        )
 
 
 def test_a_push_is_on_a_body_that_has_a_name(refused):
-    refused(lambda: scenario(disturbance=smc.signals.Push(3)))
+    refused(lambda: scenario(disturbance=smc.signals.Push(3)), "body", "Push 3")
 
 
 def test_a_plant_keeps_a_positive_mass(refused):
@@ -363,21 +367,23 @@ def test_the_field_s_usual_words_are_understood(refused):
     ):
         refused(lambda word=word: smc.Scenario(plant="duffing", law=word), f"'{meant}'?")
     refused(lambda: smc.Scenario(plant="duffing", law="STA"), "'super_twisting' or")
-    refused(lambda: smc.Scenario(plant="duffing", law=smc.law("pid"), reference=0.5))
+    refused(
+        lambda: smc.Scenario(plant="duffing", law=smc.law("pid"), reference=0.5), "reference is 0.5"
+    )
 
 
 def test_what_belongs_elsewhere_is_sent_there(tmp_path, refused):
     scenario = smc.Scenario(plant="duffing", law=smc.law("pid"), duration=0.01)
-    refused(lambda: smc.margins(scenario))  # pyright: ignore[reportArgumentType]
-    refused(lambda: smc.plot(smc.run(scenario)))  # pyright: ignore[reportArgumentType]
-    refused(lambda: smc.figure(smc.study([scenario], tmp_path)))  # pyright: ignore[reportArgumentType]
+    refused(lambda: smc.margins(scenario), "margins")  # pyright: ignore[reportArgumentType]
+    refused(lambda: smc.plot(smc.run(scenario)), "Trace(", "smc.figure")  # pyright: ignore[reportArgumentType]
+    refused(lambda: smc.figure(smc.study([scenario], tmp_path)), "no trace")  # pyright: ignore[reportArgumentType]
 
 
 def test_a_period_that_would_need_countless_default_steps_is_refused_at_once(refused):
-    for field in [
-        {"control_period": 1e306},
-        {"clock": smc.Clock(1e-310)},
-    ]:
+    for word, field in {
+        "1e+306 s": {"control_period": 1e306},
+        "1e-310 s": {"clock": smc.Clock(1e-310)},
+    }.items():
         refused(
             lambda field=field: smc.run(
                 smc.Scenario(
@@ -387,7 +393,8 @@ def test_a_period_that_would_need_countless_default_steps_is_refused_at_once(ref
                     actuator=[smc.Lag(0.01)],
                     **field,
                 )
-            )
+            ),
+            word,
         )
 
 

@@ -352,7 +352,7 @@ def test_a_description_that_makes_no_sense_is_no_trace(trace, tmp_path, refused)
         lambda about: about | {"reference": {"kind": "Sinus"}},
     ):
         path = tampered(trace, tmp_path, about)
-        refused(lambda path=path: smc.load(path))
+        refused(lambda path=path: smc.load(path), path)
 
 
 def with_member(trace, folder, name: str, content: bytes) -> Path:

@@ -150,19 +150,19 @@ def test_a_run_of_the_arm_follows_a_path_in_space():
 
 ARM = arms.arm
 REFUSED = {
-    "no tip": lambda: smc.signals.cartesian_path(ARM(), (0, 1), [(0, 0, 0)] * 2),
-    "free joint": lambda: smc.signals.cartesian_path(
+    "site": lambda: smc.signals.cartesian_path(ARM(), (0, 1), [(0, 0, 0)] * 2),
+    "cart_pole": lambda: smc.signals.cartesian_path(
         "cart_pole", (0, 1), [(0, 0, 0)] * 2, body="cart"
     ),
-    "start of another arm": lambda: smc.signals.cartesian_path(
+    "x0 has 9": lambda: smc.signals.cartesian_path(
         ARM(), (0, 1), [(0, 0, 0)] * 2, site="tip", x0=(0.1,) * 9
     ),
 }
 
 
 def test_bad_input_is_one_sentence(refused):
-    for make in REFUSED.values():
-        refused(make)
+    for word, make in REFUSED.items():
+        refused(make, word)
 
 
 def test_a_point_beyond_reach_is_named_with_its_distance(refused):

@@ -507,7 +507,7 @@ def test_conditions_are_names_with_commas_or_one_text(refused):
     for condition in options.conditions(texts):
         names.append(condition.name)
     assert names == ["noise", "sine", "worn", "encoder"]
-    refused(lambda: options.conditions(["noise,worn: friction=Coulomb(0.05)"]))
+    refused(lambda: options.conditions(["noise,worn: friction=Coulomb(0.05)"]), "comma")
 
 
 def test_a_plot_shows_J_first_and_leaves_out_settled_runs_where_all_settle(tmp_path):

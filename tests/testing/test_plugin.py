@@ -185,20 +185,21 @@ def test_second(r): assert r.overshoot < 0.1
 
 
 def test_a_mistake_is_one_sentence(step_response, refused):
-    for call in [
-        "'duffing', 'clasical', step=1",
-        "'duffing', 'classical', step=0",
-        "'duffing', 'classical', step='1'",
-        "'duffing', 'classical', step=1, frction=1",
-        "'duffing', 'classical', step=1, condition='noisy'",
-        "'cart_pole', 'none', step=1, condition='jump_mild'",
-        "'duffing', 'classical', step=1, reference=smc.Step(2)",
-        "'duffing', lambda y, g, m: (0.0, 0.0), step=1",
+    for call, word in [
+        ("'duffing', 'clasical', step=1", "'clasical'"),
+        ("'duffing', 'classical', step=0", "step is 0"),
+        ("'duffing', 'classical', step='1'", "step is '1'"),
+        ("'duffing', 'classical', step=1, frction=1", "'frction'"),
+        ("'duffing', 'classical', step=1, condition='noisy'", "'noisy'"),
+        ("'cart_pole', 'none', step=1, condition='jump_mild'", "'jump_mild'"),
+        ("'duffing', 'classical', step=1, reference=smc.Step(2)", "reference"),
+        ("'duffing', lambda y, g, m: (0.0, 0.0), step=1", "law_function"),
     ]:
         refused(
             lambda call=call: eval(
                 f"step_response({call})", {"smc": smc, "step_response": step_response}
-            )
+            ),
+            word,
         )
 
 
@@ -241,7 +242,7 @@ def test_check_takes_metrics_of_a_group_by_its_name(pole, refused):
     pole.check(**{"free peak": 1.0, "free settling_time": 1.0})
     with pytest.raises(AssertionError, match=r"^free peak is .* rad, not"):
         pole.check(**{"free peak": 1e-6})
-    refused(lambda: pole.check(**{"free max_u": 1.0}))
+    refused(lambda: pole.check(**{"free max_u": 1.0}), "'free max_u'")
 
 
 # figure and film
@@ -325,7 +326,7 @@ def test_a_golden_file_is_plain_and_holds_each_call(session, pytester):
 def test_a_broken_golden_file_is_one_sentence(tmp_path, refused):
     for text in ["{", "[]", '{"test": 3}']:
         (tmp_path / "a.json").write_text(text)
-        refused(lambda: golden.read(tmp_path / "a.json"))
+        refused(lambda: golden.read(tmp_path / "a.json"), "a.json", "--smc-update")
 
 
 @pytest.mark.parametrize(

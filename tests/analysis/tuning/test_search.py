@@ -527,7 +527,9 @@ def test_a_theorem_that_no_gains_of_the_search_hold_is_refused(refused):
             2,
             objective=LEAN,
             searches=1,
-        )
+        ),
+        "terminal",
+        "theorem",
     )
     tune(
         "duffing",
@@ -572,8 +574,9 @@ def test_a_law_that_got_more_than_its_rivals_is_not_compared(found, refused):
         {"definition": Objective(duration=0.5, u_max=12.0)},
         {"plant": smc.plant("duffing", M=2.0)},
     ):
+        (name,) = changed
         unequal = dataclasses.replace(rival, **changed)
-        refused(lambda unequal=unequal: compare([found, unequal]))
+        refused(lambda unequal=unequal: compare([found, unequal]), name)
 
 
 # files
@@ -612,7 +615,8 @@ def test_a_law_that_fails_later_is_refused_if_no_gains_mend_it(refused):
             made(0.0),
             objective=LEAN,
             searches=1,
-        )
+        ),
+        "ValueError (sensor lost)",
     )
     assert (
         not tune(

@@ -144,17 +144,16 @@ PERIOD = Condition("slow", lambda plant, duration: {"control_period": 0.01})
 
 
 @pytest.mark.parametrize(
-    "change",
+    ("name", "value", "word"),
     [
-        {"periods": [1e-3]},
-        {"periods": [1e-3, 1e-3]},
-        {"periods": [1e-3, 0.0]},
-        {"seeds": 0},
-        {"seeds": 10_001},
-        {"conditions": PERIOD},
-        {"conditions": "nois"},
+        ("periods", [1e-3], "[0.001]"),
+        ("periods", [1e-3, 1e-3], "[0.001, 0.001]"),
+        ("periods", [1e-3, 0.0], "period is 0"),
+        ("seeds", 0, "seeds is 0"),
+        ("seeds", 10_001, "10001"),
+        ("conditions", PERIOD, "control_period"),
+        ("conditions", "nois", "'nois'"),
     ],
-    ids="".join,
 )
-def test_what_has_no_order_is_refused(change, refused):
-    refused(lambda: smc.accuracy.orders(**{"laws": "classical", "plants": "duffing"} | change))
+def test_what_has_no_order_is_refused(name, value, word, refused):
+    refused(lambda: smc.accuracy.orders("classical", "duffing", **{name: value}), word)

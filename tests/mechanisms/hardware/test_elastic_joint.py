@@ -233,12 +233,13 @@ def test_the_load_of_a_friction_is_what_neither_drive_nor_spring_exerts():
 )
 def test_the_motor_side_of_a_rigid_joint_takes_no_friction(friction, actuator, refused):
     refused(
-        lambda: smc.Scenario(plant="cart_pole", law="none", friction=friction, actuator=actuator)
+        lambda: smc.Scenario(plant="cart_pole", law="none", friction=friction, actuator=actuator),
+        "side 'motor'",
     )
 
 
 def test_a_formula_is_on_the_joint(refused):
-    refused(lambda: smc.hardware.Sigmoid(0.4, 50.0, side="motor"))
+    refused(lambda: smc.hardware.Sigmoid(0.4, 50.0, side="motor"), "Sigmoid", "'motor'")
 
 
 OWN = """<mujoco><option gravity="0 0 0"/><worldbody><body><joint name="a" axis="0 1 0"/>
