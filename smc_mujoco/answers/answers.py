@@ -246,8 +246,7 @@ def evidence(fact: Verdict) -> str:
 
 def _size(lead: Lead) -> Fact:
     """Return by how much a law leads: "J 21 to 25 %"; without a number where no share is known."""
-    differ = lead.medians_differ and not lead.gaps and not math.isnan(lead.low)
-    return Fact("size", **{**vars(lead), "share": lead.share, "medians_differ": differ})
+    return Fact("size", **{**vars(lead), "share": lead.share})
 
 
 def block_of(contest: Contest) -> ScreenPart:

@@ -71,8 +71,7 @@ class Lead:
     ahead: int = 0  # number of samples in which the law is better by what counts
     samples: int = 0
     unit: str = "runs"  # what a sample is
-    # whether the ratio of the medians in the table lies on the other side of 1
-    medians_differ: bool = False
+    lower: Names = ()  # rivals whose median in the table is below the law's
 
     @property
     def share(self) -> Span:

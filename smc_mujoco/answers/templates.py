@@ -63,8 +63,7 @@ TEXTS = {
     ),
     "size": (
         "",
-        "{metric}[ (which {rival} lacks in {gaps} runs)| {share:%}][{medians_differ} (not its "
-        "median)]",
+        "{metric}[ (which {rival} lacks in {gaps} runs)| {share:%}][ (lower median: {lower:,})]",
     ),
     "lead": (
         "{law}",

@@ -105,7 +105,7 @@ class BlockComparison(NamedTuple):
             ahead=effect.ahead,
             samples=effect.samples,
             unit="sets of gains" if effect.sets else unit,
-            medians_differ=medians[winner] > medians[rival],
+            lower=tuple(law for law in rivals if medians[law] < medians[winner]),
             **numbers,
         )
 

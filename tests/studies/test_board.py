@@ -18,6 +18,7 @@ from hypothesis import strategies as st
 import smc_mujoco as smc
 from smc_mujoco.analysis.paired_runs import floor
 from smc_mujoco.analysis.ranking import Effect
+from smc_mujoco.answers.answers import evidence
 from smc_mujoco.answers.explain import meaning
 from smc_mujoco.answers.facts import Barred, Lead, NotRanked, Open, Tied
 from smc_mujoco.common.tabular import TEX, plain
@@ -603,7 +604,7 @@ LEADS = {  # how a law compares with its runner-up -> the fields of its lead
 
 @pytest.mark.parametrize("case", LEADS)
 @pytest.mark.parametrize("median", [0.5, 3.0])
-def test_a_lead_has_its_interval_as_shares_and_says_where_medians_differ(case, median):
+def test_a_lead_has_its_interval_as_shares_and_names_rivals_of_a_lower_median(case, median):
     effect, fields = LEADS[case]
     lost = (0, 8 * (case == "no value"), 0)
     fact: Any = verdicts_of(
@@ -614,10 +615,18 @@ def test_a_lead_has_its_interval_as_shares_and_says_where_medians_differ(case, m
         centres=(0.1, 2.0, median),
     ).verdict
     assert (fact.law, fact.rival, fact.metric, fact.samples) == ("third", "second", "ITAE", 8)
-    assert fact.medians_differ == (median > 2.0)
+    assert fact.lower == ("second",) * (median > 2.0)
     for name, value in fields.items():
         expected = value if isinstance(value, str) else pytest.approx(value, nan_ok=True)
         assert getattr(fact, name) == expected
+
+
+def test_a_lead_names_every_rival_of_a_lower_median():
+    """It was said of the runner-up alone."""
+    effect, _ = LEADS["ratio"]
+    fact: Any = verdicts_of(effect=effect, centres=(0.4, 0.45, 0.5)).verdict
+    assert fact.lower == LAWS[:2]
+    assert f"(lower median: {', '.join(LAWS[:2])})" in evidence(fact)
 
 
 def test_over_several_conditions_each_verdict_stands_once(pair):
