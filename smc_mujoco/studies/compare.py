@@ -14,7 +14,7 @@ from smc_mujoco.analysis import paired_runs
 from smc_mujoco.analysis.bootstrap import Interval
 from smc_mujoco.analysis.engine import Device
 from smc_mujoco.analysis.law_time import LawTime, law_time
-from smc_mujoco.analysis.ranking import Relevant, needed_to_win
+from smc_mujoco.analysis.ranking import Relevant, needed_to_rank, needed_to_win
 from smc_mujoco.analysis.relevant import RELEVANT
 from smc_mujoco.analysis.tuning.effort import Search
 from smc_mujoco.analysis.tuning.objective import BUDGET, SEARCHES, Budget, Searches
@@ -60,7 +60,7 @@ from smc_mujoco.studies.board_tables import Boards
 from smc_mujoco.studies.contests import contests
 from smc_mujoco.studies.fair_gains import Candidate, GainChoice, Trial, law_or_template
 from smc_mujoco.studies.leaderboard import METRICS, Holdout, leaderboard, objective_boards
-from smc_mujoco.studies.race import LOOKS, STUCK
+from smc_mujoco.studies.race import STUCK
 from smc_mujoco.studies.study import FULL, QUICK
 from smc_mujoco.studies.table import Table
 
@@ -68,7 +68,6 @@ if TYPE_CHECKING:
     import pandas  # pyright: ignore[reportMissingImports]
     from matplotlib.figure import Figure
 
-QUICK_SEARCHES = LOOKS[0]
 # plants times conditions that have a table each; if there are more, each plant has one table
 MAX_BLOCKS = 12
 MAX_SEED = 10**6
@@ -569,8 +568,9 @@ def compare(
       starts: where runs begin, see `starts`. Default: within 20 % of the plant's own x0.
       gains: the set of gains of the package: "tuned", "tracking", "study" or "default".
       searches: independent searches of a tuning. Laws with fewer shipped sets of gains are tuned
-        too; of laws with more, that many sets run. Default: 12; if quick as many as can name a
-        winner in each of these plants and conditions, 7 or more, and shipped sets as they are.
+        too; of laws with more, that many sets run. Default: 12; if quick as many as can rank
+        laws, and name a winner, in each of these plants and conditions, 9 or more, and shipped
+        sets as they are.
         With fewer than seven searches or seeds hardly any law can win; the answer says how many it
         takes.
       budget: largest number of sets of gains that a search tries, for each gain. With less than the
@@ -603,7 +603,6 @@ def compare(
         plants = extent.plants
     machines = list(map(as_plant, listed("plants", plants)))
     length = duration or extent.duration
-    usual = QUICK_SEARCHES if quick else SEARCHES
     trial = Trial.of(
         machines,
         conditions,
@@ -611,15 +610,11 @@ def compare(
         length,
         out,
         draws=Draws(seeds, starts, seed),
-        search=Search(searches or usual, budget, quick, device, executor),
+        search=Search(searches or SEARCHES, budget, quick, device, executor),
         gains=GainChoice(gains, tune and gains == "tuned", defaults, searches is not None),
         threads=threads,
         progress=progress,
     )
-    if quick and searches is None:  # as many as can name a winner in each block
-        least = needed_to_win(len(machines) * len(trial.conditions))
-        count = max(QUICK_SEARCHES, least)
-        trial = trial._replace(search=trial.search._replace(searches=count))
     chosen: dict[str, list[Law | Template]] = {}
     if laws is None:
         of_all = None
@@ -627,6 +622,10 @@ def compare(
         of_all = list(map(law_or_template, listed_laws(laws)))
     for plant in machines:
         chosen[plant.name] = of_all or list(map(law_or_template, _usual(plant)))
+    if quick and searches is None:  # as many as can rank the laws in each block
+        win = needed_to_win(len(machines) * len(trial.conditions))
+        count = max(win, needed_to_rank(max(map(len, chosen.values()))))
+        trial = trial._replace(search=trial.search._replace(searches=count))
     trial.check(chosen)
     candidates = trial.candidates(chosen, seeds)
     table = trial.run(candidates, seeds)

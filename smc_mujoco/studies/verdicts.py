@@ -206,14 +206,20 @@ class BlockComparison(NamedTuple):
 
     @property
     def not_ranked(self) -> list[NotRanked]:
-        """The laws with too few samples to be ranked beside others that are."""
-        laws = self.comparison.laws
-        least = min(needed_to_win(self.family), needed_to_rank(len(laws)))
+        """The laws with too few samples to be ranked, or where none wins to be among the best,
+        beside others that are.
+        """
+        comparison, laws = self.comparison, self.comparison.laws
+        win, rank = needed_to_win(self.family), needed_to_rank(len(laws))
+        units = self.by_law(comparison.units)
+        needed = dict.fromkeys(self.few, min(win, rank))
+        if comparison.winners[self.block] is None and self.named(comparison.best):
+            rivals = self.named(~comparison.worse & ~comparison.away.any(axis=2))
+            needed |= {law: rank for law in rivals if units[law] < rank}
         if len(laws) - len(self.few) < 2:
             return []
-        units = self.by_law(self.comparison.units)
         facts = []
-        for law in self.few:
+        for law, least in needed.items():
             of_law = {"law": law, "samples": units[law], "needed": least}
             facts.append(NotRanked(metric=self.label, unit=self.unit, **of_law))
         return facts

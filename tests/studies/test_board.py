@@ -650,6 +650,14 @@ def test_a_law_that_is_not_ranked_is_named_beside_the_winner_of_the_others(pair)
     assert dataclasses.replace(pair, blocks=tuple(blocks)).not_ranked == [fact]
 
 
+def test_a_law_with_too_few_sets_to_be_among_the_best_is_named():
+    """Of a law with eight sets that led by its median nothing was said."""
+    change = LOST | {"best": TWO, "level": False, "visible": 0.3, "charged": 0.0}
+    (fact,) = verdicts_of(**change, units=(20, 20, 8), sets=(12, 12, 8)).not_ranked
+    assert (fact.law, fact.samples, fact.needed) == ("third", 8, 9)
+    assert not verdicts_of(**change, units=(20, 20, 8), worse=(False, False, True)).not_ranked
+
+
 def test_a_law_that_others_beat_has_its_ratio_to_the_law_in_front(pair):
     (block, _) = pair.blocks
     assert set(block.behind) == {EVIL, "second"}

@@ -520,3 +520,19 @@ def test_a_plot_shows_J_first_and_leaves_out_settled_runs_where_all_settle(tmp_p
     medians = {entry.law: entry.interval.median for entry in board.entries}
     drawn = np.concatenate([np.ravel(line.get_xdata()) for line in page.axes[0].lines])
     assert set(medians.values()) <= set(drawn.tolist())
+
+
+@pytest.mark.parametrize(("plants", "conditions", "count"), [(1, 1, 9), (2, 2, 9), (4, 5, 10)])
+def test_a_quick_comparison_makes_as_many_searches_as_rank_its_laws(
+    monkeypatch, plants, conditions, count
+):
+    class Searching(Exception):
+        pass
+
+    def candidates(trial, chosen, seeds):
+        raise Searching(trial.search.searches)
+
+    monkeypatch.setattr(fair_gains.Trial, "candidates", candidates)
+    named = ["nominal", "noise", "coulomb", "delay_10ms", "encoder"][:conditions]
+    with pytest.raises(Searching, match=f"^{count}$"):
+        smc.compare(["pid", "adrc"], smc.plants()[:plants], named, quick=True)
