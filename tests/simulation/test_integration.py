@@ -239,7 +239,7 @@ contype="0" conaffinity="0"/></body></body></worldbody><actuator>
 @pytest.mark.parametrize(
     ("law", "off"),
     [
-        (smc.law("classical", k=8.0, c=5.0), "a quarter off"),
+        (smc.law("classical", k=8.0, c=5.0), "twice too large"),
         (smc.law("pid", kp=20.0, kd=3.0, ki=0.0), "some percent off"),
     ],
 )

@@ -300,3 +300,28 @@ def test_a_goal_in_an_obstacle_is_said(name):
                 reference=goal,
                 contact=part,
             )
+
+
+SLIDER = """<mujoco><option gravity="0 0 0"/><worldbody><body><joint name="s" type="slide"
+axis="1 0 0"/><geom size=".05" mass="3" contype="0" conaffinity="0"/></body></worldbody>
+<actuator><motor joint="s"/></actuator></mujoco>"""
+
+
+@pytest.mark.parametrize("restitution", [0.1, 0.8])
+def test_reactions_of_a_blow_sum_up_to_its_impulse_over_where_samples_fall(restitution):
+    """A sum of samples is off by where they fall after the first contact, at which the force jumps
+    from 0 to its damper's: by up to half of it for a period."""
+    plant = smc.plant_from(SLIDER, ["s"])
+    stops = smc.Stops({"s": (-0.05, 0.05)}, restitution)
+    period, speed = 5e-4, 2.0
+    runs = []
+    for late in np.arange(8) / 8:
+        start = {"x0": -late * period * speed, "v0": speed, "duration": 0.06}
+        run = smc.Scenario(plant=plant, law="none", contact=stops, control_period=period, **start)
+        runs.append(run)
+    impulses = []
+    for trace in smc.run(runs):
+        lost = speed - trace.v.min()
+        impulses.append(-trace.reaction.sum() * period / (3.0 * lost))
+    assert np.mean(impulses) == pytest.approx(1.0, abs=2e-3)
+    assert np.ptp(impulses) > 0.01
