@@ -154,11 +154,11 @@ def _other_flanks(replays: Replays, slopes: Slopes) -> Point | None:
         replays.kept,
     )
     indices = range(len(starts.pieces))
-    begun = _fitted_from(starts, slopes, _flanks(starts), FLANK_STEPS, indices)
+    begun = _fitted_from(starts, slopes, flanks(starts), FLANK_STEPS, indices)
     return None if begun.cost >= (1.0 - LAST_CHANGE) * slopes.cost else begun.point
 
 
-def _flanks(replays: Replays) -> list[Point]:
+def flanks(replays: Replays) -> list[Point]:
     """Return points with the rotor of each play at both flanks of it, and in its middle."""
     return [replays.at_flanks(replays.start, side) for side in (-1.0, 0.0, 1.0)]
 
@@ -384,7 +384,7 @@ def fit_starts(replays: Replays, most: int) -> Slopes:
     """
     reached = _own_starts(replays, replays.start, most)
     if replays.plays.any():
-        reached = _fitted_from(replays, reached, _flanks(replays), most, range(len(replays.pieces)))
+        reached = _fitted_from(replays, reached, flanks(replays), most, range(len(replays.pieces)))
     allowed = (1.0 - GOOD_PIECE / 100.0) ** 2 * reached.columns * reached.records
     samples = sum(map(len, reached.residuals))
     hard = []
@@ -396,6 +396,19 @@ def fit_starts(replays: Replays, most: int) -> Slopes:
         kicked.append(replays.start)
         kicked[-1].states[:, -len(replays.twin.columns.x) :] += velocity
     return _fitted_from(replays.only(hard), reached, kicked, most, hard)
+
+
+def starting_states(repeats: Replays, starts: Sequence[Point]) -> list[Array | None]:
+    """Return the state from which each record is best repeated as a whole in an open loop, (q +
+    2n,): that of one of some starts, or what a step from it gives.
+    """
+    costs, moved = [], []
+    for start in starts:
+        slopes = repeats.slopes(start, central=False)
+        costs.append([cost([rows]) for rows in slopes.residuals])
+        moved.append(Point(start.values, start.states + slopes.moves(start.values)))
+    best = np.array([*costs, *repeats.costs(moved)]).argmin(axis=0)
+    return [repeats.state([*starts, *moved][k], i) for i, k in enumerate(best.tolist())]
 
 
 def _fitted_from(

@@ -48,7 +48,7 @@ from smc_mujoco.identification.paths import DELAY, named_once
 from smc_mujoco.identification.published_rig import rig as find_rig
 from smc_mujoco.identification.published_rig import rigs
 from smc_mujoco.identification.records import Record
-from smc_mujoco.identification.replays import Point, Replays, Slopes, cost
+from smc_mujoco.identification.replays import Point, Replays, Slopes
 from smc_mujoco.identification.rig import Fall, Rig, Source
 from smc_mujoco.identification.standard_errors import (
     BLOCKS,
@@ -436,8 +436,17 @@ def identify(
         errors, correlations = statistics(replays, slopes, by_model)
     values = twin.in_order(replays.values(slopes.point))
     fitted = twin.with_values(values, "identified from records")
-    states = _starting_states(fitted, data, replays, slopes.point)
     steps = replays.short_steps
+    states: list[Array | None] = [None] * len(data)
+    if replays.closed and len(replays.free):
+        states = [replays.state(slopes.point, k) for k in range(len(data))]
+    elif len(replays.free):
+        of_records = [piece.record for piece in replays.pieces]
+        firsts = list(map(of_records.index, range(len(data))))
+        repeats = Replays(fitted, [], data, False, whole=True, kept=batches)
+        repeats.steps = steps
+        of_pieces = Point(np.zeros(0), slopes.point.states[firsts])
+        states = gauss_newton.starting_states(repeats, [repeats.start, of_pieces])
     if steps:
         fits_before = twin.fits(data, **steps)
     scatter = {}
@@ -484,7 +493,7 @@ def check(
 ) -> HeldOutFit:
     """Return how well a rig repeats a log that its numbers were not found from."""
     twin, data = rig.reading([records.as_columns(log, columns)])
-    fit = twin.fits(data)[0]
+    fit = twin.fit(data[0])
     if twin.controller is not None or twin.dynamics is not None:
         return HeldOutFit(fit, {})
     replays = Replays(twin, [], data, False, kept=batches)
@@ -702,34 +711,3 @@ def _solved(
     slopes = gauss_newton.refine(closed, begin, most)
     closed.evaluations += pieces.evaluations
     return closed, slopes, np.zeros(len(names))
-
-
-def _starting_states(
-    fitted: Rig, data: Sequence[Data], replays: Replays, point: Point
-) -> list[Array | None]:
-    """Return the state from which each record is repeated as a whole, (2n,); None for the measured
-    one.
-
-    In an open loop these are the measured state, that of the first piece, or one that fits the
-    whole record better.
-    """
-    if not len(replays.free):
-        return [None] * len(data)
-    if replays.closed:
-        return [replays.state(point, k) for k in range(len(data))]
-    repeats = Replays(fitted, [], data, False, whole=True, kept=replays.kept)
-    repeats.steps = replays.short_steps
-    of_records = [piece.record for piece in replays.pieces]
-    firsts = list(map(of_records.index, range(len(data))))
-    none = np.zeros(0)
-    starts = [repeats.start, Point(none, point.states[firsts])]
-    costs, moved = [], []
-    for start in starts:
-        slopes = repeats.slopes(start, central=False)
-        costs.append([cost([rows]) for rows in slopes.residuals])
-        moved.append(Point(none, start.states + slopes.moves(none)))
-    best = np.array([*costs, *repeats.costs(moved)]).argmin(axis=0)
-    states = []
-    for i in range(len(data)):
-        states.append(repeats.state([*starts, *moved][best[i]], i))
-    return states

@@ -19,7 +19,7 @@ from smc_mujoco.common.aliases import Array, Data, Fields, Names, Numbers
 from smc_mujoco.common.cached import cached_property
 from smc_mujoco.common.data import frozen_data, keyword_dataclass
 from smc_mujoco.common.errors import ScenarioError, ScenarioWarning, users_stacklevel
-from smc_mujoco.identification import records
+from smc_mujoco.identification import gauss_newton, records
 from smc_mujoco.identification.hidden_starts import HiddenStart, begun, hidden_starts
 from smc_mujoco.identification.paths import (
     DELAY,
@@ -29,6 +29,7 @@ from smc_mujoco.identification.paths import (
     parts_of,
 )
 from smc_mujoco.identification.records import Record
+from smc_mujoco.identification.replays import Replays
 from smc_mujoco.identification.rig import RecordPart, Rig, Source, Values
 from smc_mujoco.mechanisms.custom.poles import constraint_rate
 from smc_mujoco.mechanisms.hardware.backlash import Backlash
@@ -176,6 +177,14 @@ class LogRig(Rig):
         for name, values in log.items():
             columns[names.get(name, name)] = values
         return columns
+
+    def fit(self, record: Source) -> dict[str, float]:
+        """As `Rig.fit`, from hidden numbers at the start, as a spring's bend, that fit the log."""
+        if not self.hidden:
+            return super().fit(record)
+        repeats = Replays(self, [], self.reading([record])[1], False, whole=True)
+        starts = [repeats.start, *(gauss_newton.flanks(repeats) if repeats.plays.any() else ())]
+        return self.fits(repeats.data, gauss_newton.starting_states(repeats, starts))[0]
 
     def part(
         self,

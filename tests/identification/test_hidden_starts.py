@@ -76,7 +76,9 @@ def test_a_piece_that_begins_in_motion_begins_with_a_bent_spring(arm, logs, side
     bend = logs["motor"]["x"] - logs["link"]["x"]
     first = int(np.argmax(np.abs(bend[:300])))
     late = {name: column[first:] for name, column in logs[side].items()}
-    replays = Replays(rig_of(arm, side), [], [late], False)
+    rig = rig_of(arm, side)
+    assert rig.fit(late)["x"] > 99.95  # 99.84 and 99.89 with the bend that the command alone gives
+    replays = Replays(rig, [], [late], False)
     assert len(replays.free) == 4
     start = replays.slopes(replays.start)
     point = Point(np.zeros(0), start.moves(np.zeros(0)))
