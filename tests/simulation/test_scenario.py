@@ -237,12 +237,8 @@ def test_an_error_of_measurement_is_a_known_signal(refused):
         Relay(1.0),
         PerChannel((COME,)),
     ):
-        refused(
-            lambda error=error: smc.Noise(velocity_error=error), "error is", type(error).__name__
-        )
-        refused(
-            lambda error=error: smc.Noise(position_error=error), "error is", type(error).__name__
-        )
+        refused(lambda error=error: smc.Noise(velocity_error=error), f"error is {error!r}"[:30])
+        refused(lambda error=error: smc.Noise(position_error=error), f"error is {error!r}"[:30])
 
 
 def test_a_push_is_on_a_body_that_has_a_name(refused):
