@@ -10,12 +10,16 @@ from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 
+from smc_mujoco.common.attended import ENDED_BY_CTRL_C, leave
 from smc_mujoco.common.errors import ScenarioError, printable
 from smc_mujoco.common.files import to_json, with_ending, writable, write_json
+from smc_mujoco.common.interrupts import handling
 from smc_mujoco.common.scripts import users_traceback
 
 if TYPE_CHECKING:
     from smc_mujoco.answers.answer import Answer
+
+STOPPED = "stopped. A command that keeps a folder goes on from it if you run it again."
 
 
 @contextlib.contextmanager
@@ -31,7 +35,7 @@ def errors_as_sentences() -> Iterator[None]:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         raise SystemExit(1) from None
     except KeyboardInterrupt:
-        _fail("stopped. A command that keeps a folder goes on from it if you run it again.", 130)
+        _fail(STOPPED, ENDED_BY_CTRL_C)
     except Exception as error:
         if lines := users_traceback(error):
             print(lines, end="", file=sys.stderr)
@@ -49,6 +53,21 @@ def errors_as_sentences() -> Iterator[None]:
 def _fail(sentence: str, code: int = 2) -> None:
     print(f"smc-mujoco: {printable(sentence)}", file=sys.stderr)
     raise SystemExit(code)
+
+
+@contextlib.contextmanager
+def importing() -> Iterator[None]:
+    """Let Ctrl-C end the command at once in a with block that only imports: the rest of it may take
+    seconds, and a library that is half imported crashes.
+    """
+
+    def stop(*_: object) -> None:
+        with contextlib.suppress(OSError):
+            os.write(2, f"smc-mujoco: {STOPPED}\n".encode())
+        leave()
+
+    with handling(stop):
+        yield
 
 
 STDOUT = Path("-")  # as a file: standard output

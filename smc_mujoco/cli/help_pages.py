@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from contextvars import ContextVar
 from typing import Any
 
+from typer import BadParameter
 from typer.core import TyperCommand, TyperOption
 
 from smc_mujoco.answers import command
@@ -32,6 +33,9 @@ class GroupedCommand(TyperCommand):
             if getattr(param, "is_flag", False):
                 flags += [*param.opts, *param.secondary_opts]
         command.remember_flags(flags)
+        for text in (word.rpartition("=")[2].strip() for word in args):
+            if not text.isascii() and text.replace(".", "").isdecimal():  # a number to Python
+                raise BadParameter(f"{text} is no number here: write it in the digits 0 to 9", ctx)
         return super().parse_args(ctx, args)
 
     def get_params(self, ctx: Any) -> list[Any]:

@@ -16,7 +16,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterable
-from typing import Any
+from typing import Any, NoReturn
 
 from smc_mujoco.common.interrupts import delay_signals
 
@@ -97,10 +97,15 @@ def _end_with_python() -> None:
     threads = list(_running)
     _wait(threads)
     if _alive(threads):
-        for stream in (sys.stdout, sys.stderr):
-            with contextlib.suppress(Exception):
-                stream.flush()
-        os._exit(ENDED_BY_CTRL_C)
+        leave()
+
+
+def leave() -> NoReturn:
+    """End the process at once, as Ctrl-C does."""
+    for stream in (sys.stdout, sys.stderr):
+        with contextlib.suppress(Exception):
+            stream.flush()
+    os._exit(ENDED_BY_CTRL_C)
 
 
 # Called just before it: a Ctrl-C that is raised in there does not skip the end of the threads.

@@ -11,18 +11,34 @@ NUMBERS = signal.valid_signals()  # asking for them takes longer than to delay t
 
 
 @contextlib.contextmanager
-def delay_signals() -> Iterator[Callable[[], None]]:
-    """Delay what Python does at a signal to the end of a with block.
+def handling(handle: Callable[..., object]) -> Iterator[dict[int, Callable[..., object]]]:
+    """Call a function for each signal in a with block in place of its handler. Yield these, by
+    signal.
 
-    Yield a function that does now what has been delayed so far; it raises what a handler raises.
-    Other threads never receive a signal, so they delay nothing.
+    Other threads never receive a signal, so in them there are none.
     """
     handlers = {}
     if threading.current_thread() is threading.main_thread():
         for number in NUMBERS:
             if callable(handler := signal.getsignal(number)):
                 handlers[number] = handler
+    try:
+        for number in handlers:
+            signal.signal(number, handle)
+        yield handlers
+    finally:
+        for number, handler in handlers.items():
+            signal.signal(number, handler)
+
+
+@contextlib.contextmanager
+def delay_signals() -> Iterator[Callable[[], None]]:
+    """Delay what Python does at a signal to the end of a with block.
+
+    Yield a function that does now what has been delayed so far; it raises what a handler raises.
+    """
     arrived = []
+    handlers: dict[int, Callable[..., object]] = {}
 
     def deliver() -> None:
         while arrived:
@@ -30,10 +46,8 @@ def delay_signals() -> Iterator[Callable[[], None]]:
             handlers[number](number, frame)
 
     try:
-        for number in handlers:
-            signal.signal(number, lambda *arguments: arrived.append(arguments))
-        yield deliver
+        with handling(lambda *arguments: arrived.append(arguments)) as before:
+            handlers |= before
+            yield deliver
     finally:
-        for number, handler in handlers.items():
-            signal.signal(number, handler)
         deliver()

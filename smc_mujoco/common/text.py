@@ -25,6 +25,15 @@ def number(value: float, digits: int = 3) -> str:
     return _with_exponent(value, min(digits, 2))
 
 
+def real(text: str) -> float:
+    """Return the number that a user wrote, in the digits 0 to 9; ValueError for another text. To
+    Python 1_0 is a number, too, and so are digits of other alphabets.
+    """
+    if "_" in text or not text.strip().isascii():
+        raise ValueError(text)
+    return float(text)
+
+
 def in_one_notation(values: Iterable[float]) -> list[str]:
     """Return each number as `number` does; all with an exponent if one of them has one, but for 0,
     "never", "none" and "<1e-9".

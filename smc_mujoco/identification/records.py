@@ -17,6 +17,7 @@ from smc_mujoco.common import column_units
 from smc_mujoco.common.aliases import AnyPath, Array, ArrayPair, Data, Floats, Names
 from smc_mujoco.common.errors import ScenarioError, find, shown
 from smc_mujoco.common.files import csv_rows, reading
+from smc_mujoco.common.text import real
 from smc_mujoco.simulation import trace as traces
 from smc_mujoco.simulation.python_functions import evaluate
 from smc_mujoco.simulation.readings import readings
@@ -154,9 +155,9 @@ def _csv(file: Path) -> Record:
 
 def _cell(text: str) -> float:
     try:
-        return math.nan if "_" in text else float(text)  # Python takes 1_0 for 10
+        return real(text)
     except ValueError:
-        return np.nan
+        return math.nan
 
 
 def wraps(x: Array) -> Array:

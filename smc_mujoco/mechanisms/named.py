@@ -27,7 +27,7 @@ from smc_mujoco.common.errors import (
     shown,
     users_stacklevel,
 )
-from smc_mujoco.common.text import counted
+from smc_mujoco.common.text import counted, real
 from smc_mujoco.mechanisms.custom import mjcf
 from smc_mujoco.mechanisms.custom.channels import Channel, joints_of
 from smc_mujoco.mechanisms.custom.others import OTHERS, limp, usual_keyframe
@@ -189,6 +189,6 @@ def _channel(text: str) -> tuple[str, Any]:
 
 def _number(what: str, text: str) -> float:
     try:
-        return float(text)
+        return real(text)
     except ValueError:
         raise ScenarioError(f"{what} is {text!r}: give a number") from None

@@ -14,6 +14,7 @@ from smc_mujoco.common import column_units
 from smc_mujoco.common.aliases import AnyPath, Array, Floats
 from smc_mujoco.common.errors import ScenarioError, items_of, number, shown, unknown
 from smc_mujoco.common.files import csv_rows
+from smc_mujoco.common.text import real
 from smc_mujoco.mechanisms.inverse_kinematics import solve
 from smc_mujoco.mechanisms.named import as_plant
 from smc_mujoco.mechanisms.plant import Plant
@@ -302,7 +303,7 @@ def _columns(
 def _number(cell: str) -> float | None:
     """Return the number in a cell, which may be NaN; None for any other text."""
     try:
-        return float(cell)
+        return real(cell)
     except ValueError:
         return None
 

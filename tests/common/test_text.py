@@ -9,7 +9,7 @@ import pytest
 
 from smc_mujoco.common import tabular
 from smc_mujoco.common.tabular import Cell, Tabular
-from smc_mujoco.common.text import in_one_notation, number
+from smc_mujoco.common.text import in_one_notation, number, real
 
 pytestmark = pytest.mark.quick
 
@@ -177,3 +177,10 @@ def test_every_character_that_latex_reads_is_written_out():
         r"\&\%\$\#\_\{\}$<$$|$$>$$\Omega$"
         r"$\varepsilon$--$\cdot$$\times$$\pm$$-$$'$$''$"
     )
+
+
+@pytest.mark.parametrize("text", ["３", "0.３", "1_0", "٣", "x", ""])
+def test_a_number_is_in_the_digits_0_to_9(text):
+    with pytest.raises(ValueError, match=f"(^|'){text}"):
+        real(text)
+    assert real(" -1.5e-3 ") == -1.5e-3

@@ -15,6 +15,7 @@ import numpy as np
 from smc_mujoco.common.aliases import Array
 from smc_mujoco.common.data import frozen_data
 from smc_mujoco.common.errors import ScenarioError, one_line, shown
+from smc_mujoco.common.text import real
 from smc_mujoco.metrics.fold import LAST_PART
 from smc_mujoco.simulation.doubts import constant_goal
 from smc_mujoco.simulation.scenario import Scenario
@@ -103,7 +104,7 @@ def only_limits(needs: str | Sequence[str]) -> tuple[RunLimit, ...]:
 def _percent(text: object, less: str, number: str) -> float:
     """Return the number of a limit in %."""
     try:
-        most = float(number.strip().rstrip("%"))
+        most = real(number.strip().rstrip("%"))
     except ValueError:
         most = math.nan
     if not less or not 0.0 < most < math.inf:

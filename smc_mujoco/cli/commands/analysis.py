@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from smc_mujoco.cli.commands import options
-from smc_mujoco.cli.console import Terminal
+from smc_mujoco.cli.console import Terminal, importing
 from smc_mujoco.common.errors import ScenarioError
-from smc_mujoco.common.interrupts import delay_signals
+from smc_mujoco.common.text import real
 
 if TYPE_CHECKING:
     from smc_mujoco.control.law import Law
@@ -102,7 +102,7 @@ def tune(
     Example: smc-mujoco tune arm.xml:elbow --law pid --condition "mine:
     friction=my_parts.py:stribeck(static=0.3)"
     """
-    with delay_signals():
+    with importing():
         from smc_mujoco.analysis.tuning import search
 
     options.check_files(out)
@@ -180,7 +180,7 @@ def margins(
 
     Example: smc-mujoco margins duffing --law observer_free,classical --kind delay
     """
-    with delay_signals():
+    with importing():
         from smc_mujoco.common.progress import bar
         from smc_mujoco.control import gain_sets
         from smc_mujoco.draw.page import files
@@ -269,7 +269,7 @@ def worst(
     Example: smc-mujoco worst panda --law computed_torque_sliding --gains default --bound
     payload=0:2
     """
-    with delay_signals():
+    with importing():
         from smc_mujoco.draw.page import files
         from smc_mujoco.robustness.worst_case import WorstCases, worst_case
 
@@ -329,7 +329,7 @@ def sensitivity(
     Example: smc-mujoco sensitivity duffing --law super_twisting --bound delay=0:0.02,mass=0.7:1.3
     --figure breaks.png
     """
-    with delay_signals():
+    with importing():
         from smc_mujoco.draw.page import files
         from smc_mujoco.mechanisms.named import as_plant
         from smc_mujoco.robustness.sensitivity import sensitivity
@@ -358,7 +358,7 @@ def _within(disturbance: float | None, bounds: str | None) -> "Uncertainty | Non
     names = {field.name for field in dataclasses.fields(Uncertainty)}
     for name, text in options.pairs(bounds, "--bound", "mass=0.7:1.3").items():
         try:
-            values = list(map(float, text.split(":")))
+            values = list(map(real, text.split(":")))
         except ValueError:
             cure = "write a range as mass=0.7:1.3, a number as x0=0.2"
             raise ScenarioError(f"--bound {name}={text} cannot be read: {cure}") from None

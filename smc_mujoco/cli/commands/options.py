@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from smc_mujoco.common.errors import ScenarioError, find, shown
+from smc_mujoco.common.text import real
 
 if TYPE_CHECKING:
     from smc_mujoco.control.law import Law
@@ -294,7 +295,7 @@ def numbers(text: str | None, option: str, example: str) -> dict[str, float]:
     values = {}
     for name, value in pairs(text, option, example).items():
         try:
-            values[name] = float(value)
+            values[name] = real(value)
         except ValueError:
             raise ScenarioError(
                 f"{option} {name}={value} is no number: write it as {example}"
@@ -366,7 +367,7 @@ def starts(x0: str | None) -> "Starts | None":
     if x0 is None:
         return None
     try:
-        values = [float(text) for text in x0.split(",")]
+        values = list(map(real, x0.split(",")))
     except ValueError:
         raise ScenarioError(
             f"--x0 is {x0!r}: give a number, or one for each joint, such as 0.3,-0.2"
@@ -403,7 +404,7 @@ def actuator(text: str) -> "tuple[Actuator, ...]":
         name, _, numbers = part.partition(":")
         kind = find("actuator", name.strip().lower().replace("_", ""), kinds)
         try:
-            parts.append(kind(*map(float, filter(None, numbers.split(",")))))
+            parts.append(kind(*map(real, filter(None, numbers.split(",")))))
         except (TypeError, ValueError):
             raise ScenarioError(
                 f"actuator {shown(part)} cannot be read: write it as lag:0.01"

@@ -11,6 +11,7 @@ import mujoco
 import numpy as np
 
 from smc_mujoco.common.errors import ScenarioError
+from smc_mujoco.common.text import real
 
 
 class FileNumber(NamedTuple):
@@ -88,7 +89,7 @@ def check_urdf(label: str, text: str) -> None:
 
 def _below_zero(text: str) -> bool:
     try:
-        return float(text) < 0.0
+        return real(text) < 0.0
     except ValueError:  # MuJoCo says so
         return False
 
