@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from smc_mujoco.cli.commands import options
-from smc_mujoco.cli.console import Terminal
-from smc_mujoco.common.interrupts import delay_signals
+from smc_mujoco.cli.console import Terminal, importing
 
 if TYPE_CHECKING:
     from smc_mujoco.chattering.prediction import Chattering
@@ -51,7 +50,7 @@ def chatter(
     Example: smc-mujoco chatter duffing --law classical,super_twisting --actuator lag:0.01 --figure
     chatter
     """
-    with delay_signals():
+    with importing():
         from smc_mujoco.analysis.step_halving import step_halving
         from smc_mujoco.chattering.cycle_tables import rows, table
         from smc_mujoco.common.progress import bar

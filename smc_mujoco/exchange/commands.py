@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from smc_mujoco.cli.commands import options
+from smc_mujoco.cli.console import importing
 from smc_mujoco.common.errors import ScenarioError
-from smc_mujoco.common.interrupts import delay_signals
 
 if TYPE_CHECKING:
     from smc_mujoco.control.law import Law
@@ -113,13 +113,13 @@ def export(
     options.only_for(ctx, of_controller, packed or out.suffix == ".fmu", "OUT.fmu or a folder")
     if ros2 and plain:
         raise ScenarioError("a folder is for --ros2 or --plain: give one of them")
-    with delay_signals():
+    with importing():
         from smc_mujoco.control import from_text
     chosen = from_text.law(
         name,
         **from_text.parsed_gains(gains, "--gains"),  # pyright: ignore[reportArgumentType]
     )
-    with delay_signals():
+    with importing():
         if packed:
             from smc_mujoco.exchange.loop.package import law_to_package
 

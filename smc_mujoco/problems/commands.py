@@ -6,9 +6,8 @@ from typing import Annotated
 import typer
 
 from smc_mujoco.cli.commands import options
-from smc_mujoco.cli.console import Terminal
+from smc_mujoco.cli.console import Terminal, importing
 from smc_mujoco.common.errors import find, printable
-from smc_mujoco.common.interrupts import delay_signals
 
 Folder = Annotated[
     str, typer.Argument(metavar="FOLDER", help="A law and entry.toml, or a law of the library.")
@@ -74,14 +73,14 @@ def enter(
 
     Example: smc-mujoco enter entries/soft_relay --site
     """
-    with delay_signals():
+    with importing():
         from smc_mujoco.problems.suite import suites
         from smc_mujoco.problems.tracking import tracking_suites
     find("suite", suite, dict.fromkeys((*tracking_suites(), *suites())))
     if suite in tracking_suites():
         _enter_tracking(folder, suite, results, threads, executor)
         return
-    with delay_signals():
+    with importing():
         from smc_mujoco.problems import enter as entering
         from smc_mujoco.problems.results import results as load
 

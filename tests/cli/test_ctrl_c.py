@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from smc_mujoco.cli.console import STOPPED
 from smc_mujoco.common.attended import ENDED_BY_CTRL_C
 
 ROOT = Path(__file__).parents[2]
@@ -24,6 +25,27 @@ COMMANDS = {
     "which": ["which", "duffing", "--minutes", "2"],
     "identify": ["identify", "arm.xml:j", "log.csv", "--for", "j.damping"],
 }
+
+
+@pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
+def test_ctrl_c_ends_a_command_that_still_imports_at_once():
+    code = "import signal, sys; signal.signal(signal.SIGINT, signal.default_int_handler)\n"
+    code += "from smc_mujoco.cli.console import importing\n"
+    code += "with importing():\n    print(flush=True)\n    signal.pause()\n    print('went on')"
+    with subprocess.Popen(
+        [sys.executable, "-c", code],
+        env=os.environ | {"PYTHONPATH": str(ROOT)},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    ) as command:
+        assert command.stdout
+        command.stdout.readline()
+        command.send_signal(signal.SIGINT)
+        printed, said = command.communicate(timeout=60.0)
+    assert command.returncode == ENDED_BY_CTRL_C
+    assert not printed
+    assert said == f"smc-mujoco: {STOPPED}\n"
 
 
 @pytest.mark.slow

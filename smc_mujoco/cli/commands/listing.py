@@ -9,9 +9,8 @@ import typer
 
 from smc_mujoco.cli import names
 from smc_mujoco.cli.commands import options
-from smc_mujoco.cli.console import Terminal
+from smc_mujoco.cli.console import Terminal, importing
 from smc_mujoco.common import annexes
-from smc_mujoco.common.interrupts import delay_signals
 
 if TYPE_CHECKING:
     from smc_mujoco.metrics.conventions import Metric
@@ -75,18 +74,18 @@ def list_(
     options.only_for(ctx, ("needs",), name is None, "lists: leave out NAME")
     options.only_for(ctx, ("full",), name is None, "the whole list: leave out NAME")
     if name is not None and plant is not None:
-        with delay_signals():
+        with importing():
             from smc_mujoco.simulation.conditions import NAMED
         about_condition = name == CONDITIONS or name in NAMED
         options.only_for(ctx, ("plant",), about_condition, "lists and conditions: leave out NAME")
     terminal = Terminal(json)
     if name is not None and Path(name).suffix in (".c", ".so"):
-        with delay_signals():
+        with importing():
             loader = annexes.module("smc_mujoco.exchange.c.law_from_c", f"a law in C, {name},")
         lines = loader.check(Path(name), None, None, "smc_law", (), C_TIME)
         terminal.print(*lines, sep="\n", soft_wrap=True)
     elif name is not None and name not in KINDS:
-        with delay_signals():
+        with importing():
             from smc_mujoco.cli import law_pages
             from smc_mujoco.mechanisms.plant import catalogue as plants
             from smc_mujoco.metrics.catalogue import CATALOGUE
@@ -97,7 +96,7 @@ def list_(
         else:
             law_pages.print_pages(name, terminal)
     elif name is None and (needs is not None or plant is not None):
-        with delay_signals():
+        with importing():
             from smc_mujoco.cli import law_pages
         law_pages.print_suitable(options.names(needs), plant, terminal)
     elif name is None and not full and json is None and not names.of_others():
@@ -129,7 +128,7 @@ def _print_all(
     kind, or about what has this name, which may be a metric's; or their names alone. Conditions are
     those of the plant, by default one that has stops, and numbers for jumps.
     """
-    with delay_signals():
+    with importing():
         from smc_mujoco.cli import law_pages, tables
         from smc_mujoco.common.tabular import of_fields
         from smc_mujoco.mechanisms.named import as_plant

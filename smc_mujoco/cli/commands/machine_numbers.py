@@ -8,10 +8,9 @@ from typing import Annotated, Any
 import typer
 
 from smc_mujoco.cli.commands import options
-from smc_mujoco.cli.console import Terminal
+from smc_mujoco.cli.console import Terminal, importing
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.files import with_ending
-from smc_mujoco.common.interrupts import delay_signals
 
 Machine = Annotated[
     str | None,
@@ -173,7 +172,7 @@ def identify(
         return
     if machine is None or not files:
         raise ScenarioError("identify needs a machine and its logs, or --pairs FILE")
-    with delay_signals():
+    with importing():
         from smc_mujoco.answers import answers
         from smc_mujoco.answers.command import PROGRAM
         from smc_mujoco.answers.facts import Fact, NextStep
@@ -237,7 +236,7 @@ def _from_pairs(
     terminal: Terminal,
 ) -> None:
     """Find friction in pairs of speed and torque."""
-    with delay_signals():
+    with importing():
         from smc_mujoco.identification import speed_torque
 
     read = speed_torque.read_pairs
@@ -271,7 +270,7 @@ def excitation(
     Example: smc-mujoco excitation arm.xml:shoulder --for shoulder.damping,input_delay --out m.csv
     """
     terminal = Terminal(json)
-    with delay_signals():
+    with importing():
         from smc_mujoco.draw.page import files
         from smc_mujoco.identification import excitation as exciting
 

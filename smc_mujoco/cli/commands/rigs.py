@@ -7,9 +7,8 @@ from typing import Annotated
 import typer
 
 from smc_mujoco.cli.commands import options
-from smc_mujoco.cli.console import Terminal
+from smc_mujoco.cli.console import Terminal, importing
 from smc_mujoco.common.errors import ScenarioError
-from smc_mujoco.common.interrupts import delay_signals
 
 Name = Annotated[
     str | None,
@@ -88,7 +87,7 @@ def rig(
 
 def _list(terminal: Terminal) -> None:
     """List the rigs."""
-    with delay_signals():
+    with importing():
         from smc_mujoco.common.tabular import of_fields
         from smc_mujoco.identification.published_rig import catalogue
 
@@ -107,7 +106,7 @@ def _repeat(
     terminal: Terminal,
 ) -> None:
     """Show a record beside the runs of the rig's twins."""
-    with delay_signals():
+    with importing():
         from smc_mujoco.cli.run_scene import filmed
         from smc_mujoco.common.files import with_ending, writable
         from smc_mujoco.common.tabular import Tabular

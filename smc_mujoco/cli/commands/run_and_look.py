@@ -7,8 +7,7 @@ import typer
 from rich.text import Text
 
 from smc_mujoco.cli.commands import options
-from smc_mujoco.cli.console import Terminal
-from smc_mujoco.common.interrupts import delay_signals
+from smc_mujoco.cli.console import Terminal, importing
 
 
 def run(
@@ -48,7 +47,7 @@ def run(
 
     Example: smc-mujoco run duffing --no-film --out results --export csv,parquet
     """
-    with delay_signals():
+    with importing():
         from smc_mujoco.cli.run_scene import perform
         from smc_mujoco.simulation.trace import formats
         from smc_mujoco.studies import scene as scenes
@@ -82,7 +81,7 @@ def show(
 
     Example: smc-mujoco show videos/duffing/nominal-classical.npz --figure classical
     """
-    with delay_signals():
+    with importing():
         from smc_mujoco.analysis.step_halving import UNTRIED, repeats_every_run
         from smc_mujoco.cli import tables
         from smc_mujoco.common.text import capital
@@ -167,7 +166,7 @@ def view(
 
     Example: smc-mujoco view arm.xml:shoulder+elbow --law adrc --record run.html
     """
-    with delay_signals():
+    with importing():
         from smc_mujoco.draw.view import view as show_view
 
     viewed = machine

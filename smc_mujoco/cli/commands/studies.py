@@ -9,9 +9,8 @@ import typer
 
 from smc_mujoco.analysis.relevant import RELEVANT
 from smc_mujoco.cli.commands import options
-from smc_mujoco.cli.console import Terminal
+from smc_mujoco.cli.console import Terminal, importing
 from smc_mujoco.common.errors import ScenarioError
-from smc_mujoco.common.interrupts import delay_signals
 from smc_mujoco.common.text import counted
 
 if TYPE_CHECKING:
@@ -22,6 +21,7 @@ if TYPE_CHECKING:
 # pictures a second of the film; the largest is enough to follow a run, the smallest to see it
 MAX_FPS, MIN_FPS = 15.0, 2.0
 LEAST_LEFT = 0.05  # of the minutes, in which a first picture is begun; chosen
+LEAST_MINUTES = 1e-3  # that are left when the command has loaded; chosen
 MADE = 0.8  # of the time that is left, in which they must be made: then they are written; chosen
 
 Seed = Annotated[int, typer.Option(min=0, help="Seed of initial states, noise and phases.")]
@@ -104,7 +104,7 @@ def which(
     "worn: friction=Coulomb(0.05), sensor=Encoder(counts=4096)" --need "overshoot<10" --minutes 5
     """
     began = time.monotonic()
-    with delay_signals():
+    with importing():
         from smc_mujoco.studies.which import QUICK_MINUTES
         from smc_mujoco.studies.which import which as recommend
 
@@ -134,7 +134,7 @@ def which(
         device=device,
         executor=executor,
         falling=falling,
-        minutes=length,
+        minutes=length and max(LEAST_MINUTES, length - (time.monotonic() - began) / 60.0),
     )
     terminal.answer(recommendation, full)
     if film:
@@ -168,12 +168,17 @@ def _film(
     if ends - time.monotonic() <= least:
         terminal.note(late)
         return
+
+    def on_time() -> None:
+        if time.monotonic() > ends:
+            raise TimeoutError
+
     run = [recommendation.worst_trace]
     title = _worst_title(recommendation)
     try:
         begun = time.monotonic()
         frames = films.Frames(run, title=title, size=films.FULL_SIZE)
-        pictures = iter(frames)
+        pictures = films.pictures(frames, between=on_time)
         next(pictures)
         first = time.monotonic()
         next(pictures, None)
@@ -198,6 +203,8 @@ def _film(
                 "same command with more --minutes makes it.",
                 wrap=True,
             )
+    except TimeoutError:
+        terminal.note(late)
     except ScenarioError as error:  # the answer stands without it
         terminal.note(f"no film: {error}", wrap=True)
 
@@ -329,7 +336,7 @@ def compare(
     Example: smc-mujoco compare arm.xml:shoulder --x0 0.5 --law pid,classical --condition noise
     --condition "mine: friction=my_parts.py:stribeck(static=0.3)" --figure arm --latex arm.tex
     """
-    with delay_signals():
+    with importing():
         from smc_mujoco.common.files import with_ending
         from smc_mujoco.studies.compare import compare as run
         from smc_mujoco.studies.leaderboard import METRICS

@@ -6,8 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from smc_mujoco.cli.commands import options
-from smc_mujoco.cli.console import Terminal
-from smc_mujoco.common.interrupts import delay_signals
+from smc_mujoco.cli.console import Terminal, importing
 
 if TYPE_CHECKING:
     from smc_mujoco.evidence.audit.paper import Paper as AuditedPaper
@@ -84,7 +83,7 @@ def claims(
         options.only_for(ctx, audited, False, "audits: leave out --papers, --new and --check")
         _papers(papers, new, check, Terminal(json))
         return
-    with delay_signals():
+    with importing():
         from smc_mujoco.common.files import with_ending, writable
         from smc_mujoco.common.progress import bar
         from smc_mujoco.evidence.audit.audit import DEFAULT_PAPER, audit, document
@@ -127,7 +126,7 @@ def _finish(claims: Any, quick: bool, evidence: Path | None, terminal: Terminal)
 
 def _papers(listed: bool, new: Path | None, check: Path | None, terminal: Terminal) -> None:
     """Begin a paper of one's own, check evidence, or list the papers."""
-    with delay_signals():
+    with importing():
         from smc_mujoco.cli import tables
         from smc_mujoco.common.tabular import of_fields
         from smc_mujoco.evidence.audit import evidence, paper
