@@ -16,9 +16,11 @@ from collections.abc import Collection, Hashable
 import mujoco
 import numpy as np
 
+from smc_mujoco.common import mjcb
 from smc_mujoco.common.aliases import Floats
 from smc_mujoco.common.errors import ScenarioError, shown
 from smc_mujoco.common.frozen import frozen
+from smc_mujoco.common.process import return_freed_memory
 from smc_mujoco.common.text import joined
 from smc_mujoco.mechanisms.hardware.contact import contact_pairs
 from smc_mujoco.mechanisms.hardware.encoder import remember
@@ -127,7 +129,10 @@ def mechanism(scenario: Scenario) -> Mechanism:
     """
     key = structure(scenario)
     if (shared := _mechanisms.get(key)) is None:
+        forget_large()
         base = compile_model(scenario, USERDATA, scenery=False)
+        if mujoco.mj_sizeModel(base) > mjcb.LARGE:  # the spec, which is gone, took more
+            return_freed_memory()
         shared = _mechanisms[key] = Mechanism(base, channels(base))
         mechanisms = [*_recent, shared][-MAX_RECENT:]
         sizes = [mujoco.mj_sizeModel(recent.model) for recent in mechanisms]
@@ -137,6 +142,12 @@ def mechanism(scenario: Scenario) -> Mechanism:
     elif source := getattr(scenario.plant.build, "source", None):  # of a user's model
         source.check_unchanged()
     return shared
+
+
+def forget_large() -> None:
+    """Free a model that is kept for later runs if it is so large that it is kept alone."""
+    if any(mujoco.mj_sizeModel(recent.model) > MAX_RECENT_BYTES for recent in [*_recent]):
+        _recent.clear()
 
 
 def channels(model: mujoco.MjModel) -> np.ndarray:

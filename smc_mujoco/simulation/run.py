@@ -177,16 +177,35 @@ def stream(
     threads = cores(threads)
     if not callable(report):
         raise ScenarioError(f"report is {shown(report)}: give a function of a number of steps")
-    for batch in _batches(enumerate(map(prepare, as_iterable(scenarios))), threads):
-        indices, items = zip(*batch, strict=True)
-        if items[0].why_not:
-            words = f"{items[0].why_not}; it runs in Python, several times slower"
-            warn_once(words, PlainLoopWarning)
-        with callback.installed(), memory_for(items):
-            traces = ScenarioBatch(items, threads).run(report)
-        if len(batch) >= MIN_TRIM_RUNS:
-            return_freed_memory()
-        yield from zip(indices, traces, strict=True)
+    for group in _by_mechanism(as_iterable(scenarios)):
+        for batch in _batches(((i, prepare(item)) for i, item in group), threads):
+            indices, items = zip(*batch, strict=True)
+            if items[0].why_not:
+                words = f"{items[0].why_not}; it runs in Python, several times slower"
+                warn_once(words, PlainLoopWarning)
+            with callback.installed(), memory_for(items):
+                traces = ScenarioBatch(items, threads).run(report)
+            if len(batch) >= MIN_TRIM_RUNS:
+                return_freed_memory()
+            del items, batch  # with the model, before the next one is compiled
+            yield from zip(indices, traces, strict=True)
+
+
+def _by_mechanism(
+    scenarios: Iterable[Scenario | Prepared],
+) -> Iterator[Iterable[tuple[int, Scenario | Prepared]]]:
+    """Yield pairs (index, scenario), of a sequence those of one mechanism together: no other model
+    is then in memory while they run.
+    """
+    if not isinstance(scenarios, Sequence):
+        yield enumerate(scenarios)
+        return
+    groups: dict[Hashable, list[tuple[int, Scenario | Prepared]]] = {}
+    for pair in enumerate(scenarios):
+        item = pair[1].scenario if isinstance(pair[1], Prepared) else pair[1]
+        key = models.structure(item) if isinstance(item, Scenario) else None
+        groups.setdefault(key, []).append(pair)
+    yield from groups.values()
 
 
 def run_unjudged(

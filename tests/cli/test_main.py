@@ -27,7 +27,7 @@ from smc_mujoco.cli import run_scene as show
 from smc_mujoco.cli.commands import options, studies
 from smc_mujoco.common import gl
 from smc_mujoco.common.errors import ScenarioError, ScenarioWarning
-from smc_mujoco.draw.film import pace
+from smc_mujoco.draw.film import film, pace
 from smc_mujoco.mechanisms.plant import catalogue as plants
 from smc_mujoco.metrics.catalogue import CATALOGUE, metrics, score
 from smc_mujoco.simulation import run as runs
@@ -689,6 +689,10 @@ def test_a_film_of_an_answer_has_as_many_pictures_as_its_time_allows(tmp_path, m
     terminal = types.SimpleNamespace(note=note, wrote=said.append)
     for seconds, least in ((0.0, 0.0), (20.0, 30.0)):
         studies._film(recommendation, tmp_path, time.monotonic() + seconds, terminal, least)
+        assert "no time for a film" in said.pop()
+    with monkeypatch.context() as patch:  # over while the first picture is prepared
+        patch.setattr(film, "placement", lambda *_: pytest.fail("it went on"))
+        studies._film(recommendation, tmp_path, time.monotonic() + 1e-3, terminal)
         assert "no time for a film" in said.pop()
     assert not list(tmp_path.iterdir())
     with monkeypatch.context() as patch:

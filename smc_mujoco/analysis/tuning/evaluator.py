@@ -26,6 +26,7 @@ from smc_mujoco.common.aliases import Array, Floats, Pair
 from smc_mujoco.control.component import Component
 from smc_mujoco.metrics.catalogue import ITAE, TV
 from smc_mujoco.simulation import callback, state
+from smc_mujoco.simulation.model import structure
 from smc_mujoco.simulation.prepare import Packed, Prepared, prepare
 from smc_mujoco.simulation.run import (
     BATCH_BYTES,
@@ -74,22 +75,31 @@ class Evaluator:
         self.threads = cores(threads)
         self._options = threads, by_equation, off, slots, device
         self._off, self._slots, self._device = off, slots, device
-        prepared = []
+        self._prepared: list[Prepared] = []  # the cases, unless their models are large
+        self._large = False
+        self._bytes = 0  # of the cases
+        sizes: dict[Hashable, int] = {}  # key of a model, and its bytes
+        keys = []
+        self.engine = MUJOCO
         for case in self.cases:
-            prepared.append(prepare(case))
-        self._prepared = prepared
+            item = prepare(case)
+            if item.why_not:
+                self.engine = PYTHON
+            keys.append((structure(case), case.control_period, case.samples))
+            sizes[keys[-1][0]] = mujoco.mj_sizeModel(item.mechanism.model)
+            self._large = sum(sizes.values()) > LARGE_MODELS
+            self._prepared = [] if self._large else [*self._prepared, item]
+            self._bytes += item.bytes
         self._members: list[tuple[Hashable, list[int]]] = []  # key of the equation, and cases
         self._runners: list[Any] = []  # of each of these
-        if any(item.why_not for item in prepared):
-            self.engine = PYTHON
+        if self.engine == PYTHON:
             return
         members: dict[tuple[Hashable, Hashable], list[int]] = {}
-        for i, item in enumerate(prepared):
+        for i, key in enumerate(keys):
             logless = by_equation and not goal.limits  # which need a log
             fast = equation.key_of(self.cases[i], device) if logless else None
-            own_key = None if fast else item.key
+            own_key = None if fast else key
             members.setdefault((fast, own_key), []).append(i)
-        self.engine = MUJOCO
         for (fast, _), indices in members.items():
             if fast:
                 self.engine = EQUATION
@@ -97,25 +107,26 @@ class Evaluator:
 
     def _runner(self, fast: Hashable, indices: Sequence[int]) -> Any:
         """Return what runs these cases, as many candidates at once as fit the memory of a batch."""
-        of_one = sum(item.bytes for item in self._prepared)
-        slots = max(1, min(self._slots, BATCH_BYTES // of_one))
-        with memory_for(self._prepared), callback.installed():
-            if fast:
-                cases = [self.cases[i] for i in indices]
-                return equation.Equations(self.goal, cases, self.names, self.threads, self._device)
+        slots = max(1, min(self._slots, BATCH_BYTES // self._bytes))
+        cases = [self.cases[i] for i in indices]
+        if self._large:
+            batch = list(map(prepare, cases))
+        else:
             batch = [self._prepared[i] for i in indices]
+        with memory_for(batch), callback.installed():
+            if fast:
+                return equation.Equations(self.goal, cases, self.names, self.threads, self._device)
             return _RepeatedBatch(batch, self.names, self.threads, self._off, slots)
 
     def _each_runner(self) -> Iterator[tuple[Sequence[int], Any]]:
         """Yield the indices of cases and what runs them, which is kept for the next candidates; of
         large models, which a batch has twice, one after the other is made and freed.
         """
-        self._prepared = self._prepared or list(map(prepare, self.cases))
-        models = {id(item.mechanism): item.mechanism.model for item in self._prepared}
-        if sum(map(mujoco.mj_sizeModel, models.values())) > LARGE_MODELS:
+        if self._large:
             for member in self._members:
                 yield member[1], self._runner(*member)
             return
+        self._prepared = self._prepared or list(map(prepare, self.cases))
         if not self._runners:
             self._runners = [self._runner(*member) for member in self._members]
         for (_, indices), runner in zip(self._members, self._runners, strict=True):
@@ -134,6 +145,7 @@ class Evaluator:
             for k, costs in enumerate(engine(candidates, self._terms)):
                 row, column = divmod(k, len(indices))
                 terms[row * size + indices[column]] = costs
+            del engine  # before the next one is made
         if self.engine == PYTHON:
             terms = self._terms_of_traces(candidates)
         evaluations = []

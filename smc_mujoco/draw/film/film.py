@@ -49,6 +49,7 @@ from smc_mujoco.draw.film.stage import Stage
 from smc_mujoco.draw.film.track import MachineTrack
 from smc_mujoco.draw.film.video import encoder, mediapy
 from smc_mujoco.metrics.conventions import ChannelGroup
+from smc_mujoco.simulation import model as models
 from smc_mujoco.simulation.trace import Trace
 
 if TYPE_CHECKING:
@@ -299,9 +300,14 @@ def _checked_size(size: Iterable[int]) -> tuple[int, int]:
     return int(sides[0]), int(sides[1])
 
 
-def pictures(frames: Frames, ahead: bool = False) -> Generator[Array]:
+def pictures(
+    frames: Frames, ahead: bool = False, between: Callable[[], object] = bool
+) -> Generator[Array]:
     """Yield the pictures of a film at the times of its clock, each (height, width, 3) uint8; with
     `ahead` while the next one is drawn.
+
+    What comes before the first one takes seconds for a robot with meshes. `between` is called
+    between its steps, and may raise.
     """
     with rc_context({"axes.facecolor": style.PAPER}):  # whatever the caller's page
         runs = DrawnRuns.of(frames.traces, frames.labels)
@@ -313,6 +319,7 @@ def pictures(frames: Frames, ahead: bool = False) -> Generator[Array]:
     clock = frames.clock
     scales = arrows.scales(runs.traces)
     tracks = tracks_at(clock, runs, scales)
+    between()
     keys = [arrows.key(runs.traces, scales)]
     if clock.close:
         keys.append([f"last periods, deflections × {clock.close.factor:g}"])
@@ -325,12 +332,15 @@ def pictures(frames: Frames, ahead: bool = False) -> Generator[Array]:
             ordered = [[*key, order] for key in keys]
             lines = head_lines(runs, size, frames.title, ordered)
             placed = placement(tracks, frames.camera, runs.names, size, lines)
+        between()
         stages = list(staged(tracks, placed, clock.times))
     arguments = size, placed.tiles, placed.labels, frames.title
     sheet = Sheet(runs, *arguments, keys[0], lines=lines, order=order)
+    between()
     with contextlib.ExitStack() as opened:
         for stage in stages:
             opened.enter_context(stage)
+            between()
         shots = separate_shots
         if placed.lanes is not None:
             shared_picture.hide_between(stages)
@@ -343,10 +353,7 @@ def pictures(frames: Frames, ahead: bool = False) -> Generator[Array]:
         yield from drawn(clock, stages, shots, overlays, sheet, ahead)
         if close := clock.close:
             start = float(close.times[0])
-            closing = [horizon.since(trace, start) for trace in runs.traces]
-            last = runs._replace(traces=closing)
-            stop = end(last.traces)
-            last = last._replace(span=(stop, stop))
+            last = _since(runs, start)
             sheet = Sheet(last, *arguments, keys[-1], start, lines, order)
             for stage, track in zip(stages, tracks_at(close, runs, scales), strict=True):
                 middle = track.x.mean(axis=0)
@@ -354,6 +361,13 @@ def pictures(frames: Frames, ahead: bool = False) -> Generator[Array]:
                 track.x = middle + larger
                 stage.track = track
             yield from drawn(close, stages, shots, overlays, sheet, ahead)
+
+
+def _since(runs: DrawnRuns, start: float) -> DrawnRuns:
+    """Return runs from a time on, s, with all of them in sight."""
+    closing = [horizon.since(trace, start) for trace in runs.traces]
+    stop = end(closing)
+    return runs._replace(traces=closing, span=(stop, stop))
 
 
 def tracks_at(
@@ -437,6 +451,7 @@ def placement(
     """Return where machines stand in a film of some size, px, before the chosen camera, below so
     many lines of words.
     """
+    models.forget_large()  # a film has models of its own
     puppets = [Puppet.of(track.trace.scenario) for track in tracks]
     turn = puppets[0].turn(chosen)
     courses = []

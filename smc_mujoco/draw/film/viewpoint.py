@@ -6,7 +6,6 @@ It depends on the model and on the pose in which runs begin by default, so all f
 have it.
 """
 
-import copy
 import itertools
 
 import mujoco
@@ -108,17 +107,16 @@ def visible(
     inside their boxes.
     """
     ahead = -camera.turn(*angles)[:, 2]
-    alone = copy.copy(model)
-    alone.geom_group[:] = world.HIDDEN_GROUP
-    alone.geom_group[links] = 0
-    meets = 0
-    seen = 0
-    for point in points_inside(model, data, links):
-        start = point - START * model.stat.extent * ahead
-        if first_hit(alone, data, start, ahead) >= 0:
-            meets += 1
-            seen += first_hit(model, data, start, ahead) in links
-    return seen / meets if meets else 1.0
+    starts = points_inside(model, data, links) - START * model.stat.extent * ahead
+    seen = np.isin([first_hit(model, data, start, ahead) for start in starts], links)
+    groups = model.geom_group.copy()  # a copy of the model would have its meshes, too
+    model.geom_group[:] = world.HIDDEN_GROUP
+    model.geom_group[links] = 0
+    try:
+        meets = np.array([first_hit(model, data, start, ahead) for start in starts]) >= 0
+    finally:
+        model.geom_group[:] = groups
+    return float(seen[meets].mean()) if meets.any() else 1.0
 
 
 def points_inside(model: mujoco.MjModel, data: mujoco.MjData, geoms: Array) -> Array:

@@ -11,6 +11,7 @@ import os
 import re
 import sys
 import threading
+import weakref
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path, PurePosixPath
 from typing import Any
@@ -214,12 +215,17 @@ def _parsed(source: ModelSource) -> mujoco.MjSpec:
     return source.read()
 
 
-@functools.lru_cache(maxsize=MAX_KEPT)
+_unedited: weakref.WeakValueDictionary[ModelSource, mujoco.MjModel] = weakref.WeakValueDictionary()
+
+
 def unedited_model(source: ModelSource) -> mujoco.MjModel:
-    """Return the model of a source, without what is only seen, which is shared."""
-    spec = source.spec()
-    leave_out_scenery(spec)
-    return source.compiled(spec)
+    """Return the model of a source, without what is only seen, which all who use it now share."""
+    source.check_unchanged()
+    if (model := _unedited.get(source)) is None:
+        spec = source.spec()
+        leave_out_scenery(spec)
+        model = _unedited[source] = source.compiled(spec)
+    return model
 
 
 def _built(spec: mujoco.MjSpec) -> mujoco.MjModel:

@@ -5,7 +5,6 @@ is as the model says. "held": other joints with a motor are held there too, by a
 "locked": every other joint is welded at the start, and ties of the channels to it are cut.
 """
 
-import functools
 import math
 from collections.abc import Collection, Iterable, Sequence
 
@@ -69,7 +68,6 @@ def usual_keyframe(spec: mujoco.MjSpec) -> str:
     return "home" if "home" in names else ""
 
 
-@functools.lru_cache(maxsize=8)
 def at_start(
     source: ModelSource, channels: Pairs, keyframe: str | None
 ) -> tuple[mujoco.MjModel, mujoco.MjData]:

@@ -29,7 +29,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import mujoco
 import numpy as np
 
-from smc_mujoco.common import errors
+from smc_mujoco.common import errors, mjcb
 from smc_mujoco.common.aliases import Fields, Names
 from smc_mujoco.common.constraints import OneOf, constrained
 from smc_mujoco.common.errors import (
@@ -39,6 +39,7 @@ from smc_mujoco.common.errors import (
     shown,
     users_stacklevel,
 )
+from smc_mujoco.common.process import return_freed_memory
 from smc_mujoco.common.text import joined
 from smc_mujoco.mechanisms.custom import channels as own
 from smc_mujoco.mechanisms.custom import mjcf, urdf
@@ -154,9 +155,9 @@ def plant_from(
     else:
         pairs = own.coerce(channels)
     measured = items_of("measured", () if measured is None else measured)
+    model = mjcf.unedited_model(source)
     machine = _plant(source, pairs, name, keyframe, tip, others or "", measured)
     spec = source.spec()
-    model = mjcf.unedited_model(source)
     read = urdf.read(Path(source.path))
     doubts = [
         *_narrow_ranges(source.label, machine, spec),
@@ -179,6 +180,9 @@ def plant_from(
         doubts += may_push(source.label, model, tendons.cables)
     for doubt in doubts:
         warnings.warn(doubt, ScenarioWarning, users_stacklevel())
+    if mujoco.mj_sizeModel(model) > mjcb.LARGE:
+        del model
+        return_freed_memory()
     return machine
 
 

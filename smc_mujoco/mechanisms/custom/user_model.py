@@ -54,14 +54,8 @@ class UserModel:
 
     def edited(self) -> mujoco.MjSpec:
         """Return the model without sensors, and with its other joints as wanted."""
-        spec = self.source.spec()
-        # tuples may name sensors and motors that are deleted
-        while named := [*spec.tuples, *spec.sensors]:
-            # MuJoCo 4 also deletes the tuples that name it, so list them again
-            spec.delete(named[0])
-        seen = joints_of(self.channels) + list(self.measured)
-        edit(spec, self.source, self.channels, self.keyframe, self.others, seen)
-        return spec
+        self.source.check_unchanged()
+        return _edited(self).copy()
 
     def with_channels(self) -> mujoco.MjSpec:
         """Return the model with the sensors of each channel, and a motor for each driven one. A
@@ -137,6 +131,19 @@ class UserModel:
                 assets[name] = base64.b64encode(content).decode()
             data |= {"text": self.source.text, "assets": assets}
         return data
+
+
+@functools.lru_cache(maxsize=32)
+def _edited(build: UserModel) -> mujoco.MjSpec:
+    """Return the model that `UserModel.edited` copies, which is made once."""
+    spec = build.source.spec()
+    # tuples may name sensors and motors that are deleted
+    while named := [*spec.tuples, *spec.sensors]:
+        # MuJoCo 4 also deletes the tuples that name it, so list them again
+        spec.delete(named[0])
+    seen = joints_of(build.channels) + list(build.measured)
+    edit(spec, build.source, build.channels, build.keyframe, build.others, seen)
+    return spec
 
 
 @functools.lru_cache(maxsize=32)
