@@ -320,7 +320,7 @@ def _first_sets(
     ready = [entrant for entrant in entrants if not entrant.searched]
     progress.says(f"{SETS} (now u = 0 and given gains)")
     _judge(course, ready, 1)
-    if ready and math.isfinite(clock.ends):  # once more, as the first runs compiled
+    if ready and 0.0 < clock.left < math.inf:  # once more, as the first runs compiled
         _judge(course, ready[:1], 2)
         del ready[0].J[1:]
     progress.says(SETS, float(len(ready)))

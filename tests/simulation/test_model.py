@@ -9,7 +9,10 @@ import numpy as np
 import pytest
 
 import smc_mujoco as smc
+from smc_mujoco.analysis.tuning import evaluator
+from smc_mujoco.analysis.tuning.objective import Objective
 from smc_mujoco.simulation import model
+from smc_mujoco.simulation import run as runs
 from smc_mujoco.simulation.model import compile_model, without_scenery
 from smc_mujoco.simulation.signals import Push
 
@@ -225,3 +228,34 @@ def test_a_thread_may_keep_its_model_while_another_counts_the_bytes_of_those_kep
     shared = model.mechanism(first)
     assert shared in model._recent
     assert not meanwhile
+
+
+def test_of_large_models_one_is_in_memory_while_runs_and_searches_of_several_are_made(monkeypatch):
+    monkeypatch.setattr(model, "MAX_RECENT_BYTES", 0)
+    monkeypatch.setattr(evaluator, "LARGE_MODELS", 0)
+    monkeypatch.setattr(model, "_recent", [])
+    monkeypatch.setattr(model, "_mechanisms", weakref.WeakValueDictionary())
+    batches, together = weakref.WeakSet(), []
+    make = runs.ScenarioBatch.__init__
+
+    def noted(batch, prepared, *rest):
+        together.append((len(prepared), len(model._mechanisms), len(batches)))
+        batches.add(batch)
+        make(batch, prepared, *rest)
+
+    def alone(*given, **named):
+        assert not model._mechanisms
+        return compile_model(*given, **named)
+
+    monkeypatch.setattr(runs.ScenarioBatch, "__init__", noted)
+    monkeypatch.setattr(model, "compile_model", alone)
+    law = smc.law("observer_free", lam=6.0, k1=3.0)
+    cases = [
+        smc.Scenario(plant="duffing", law=law, duration=0.1, physics_step=h) for h in (1e-3, 5e-4)
+    ]
+    runs.run_unjudged([*cases, *cases])
+    assert together == [(2, 1, 0), (2, 1, 0)]
+    together.clear()
+    goal = Objective(conditions=("nominal",), duration=0.1)
+    evaluator.Evaluator(goal, cases, ("lam",))([(6.0,), (7.0,)])
+    assert together == [(1, 1, 0), (1, 1, 0)]

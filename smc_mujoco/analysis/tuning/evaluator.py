@@ -90,6 +90,7 @@ class Evaluator:
             self._large = sum(sizes.values()) > LARGE_MODELS
             self._prepared = [] if self._large else [*self._prepared, item]
             self._bytes += item.bytes
+            del item  # with a large model, before the next one is compiled
         self._members: list[tuple[Hashable, list[int]]] = []  # key of the equation, and cases
         self._runners: list[Any] = []  # of each of these
         if self.engine == PYTHON:

@@ -62,6 +62,24 @@ def test_a_mesh_that_is_written_again_in_the_same_second_is_the_one_that_runs(tm
     assert masses == pytest.approx(np.array(sizes) * masses[0])
 
 
+def test_a_height_field_that_is_written_again_in_the_same_second_is_the_one_that_runs(tmp_path):
+    (tmp_path / "m.xml").write_text(
+        '<mujoco><asset><hfield name="h" file="h.bin" size="1 1 .1 .1"/></asset><worldbody>'
+        '<geom type="hfield" hfield="h"/><body pos="0 0 1"><joint name="j"/><geom size=".1"/>'
+        "</body></worldbody></mujoco>"
+    )
+    heights = 0.2, 0.3, 0.4, 0.2
+    middles = []
+    for k, height in enumerate(heights):
+        grid = np.array([[0.0, height, 1.0]] * 3, np.float32)
+        content = np.array([3, 3], np.int32).tobytes() + grid.tobytes()
+        (tmp_path / "h.bin").write_bytes(content)
+        os.utime(tmp_path / "h.bin", ns=(0, 10**9 + k))
+        model = mjcf.source(tmp_path / "m.xml").spec().compile()
+        middles.append(model.hfield_data[1])
+    assert middles == pytest.approx(heights)
+
+
 def test_a_pipe_beside_a_model_that_cannot_be_read_is_not_waited_for(tmp_path):
     if not hasattr(os, "mkfifo"):
         pytest.skip("Windows has no such pipes")
