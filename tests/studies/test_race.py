@@ -375,3 +375,13 @@ def test_where_nothing_decides_a_law_that_rests_comes_before_one_that_shakes():
     assert in_order(settled, None, undecided, ["a"], {"b": 1, "c": 2}) == ["a", "b", "c"]
     decided = types.SimpleNamespace(winner="a", first=["a"])
     assert in_order(settled, None, decided, ["a"]) == ["a", "b", "c"]
+
+
+@pytest.mark.parametrize(("end", "judgements"), [(1000.0, 2), (0.5, 1)])
+def test_u_0_is_judged_again_for_the_pace_only_while_there_is_time(end, judgements, now, run):
+    clock = AnswerTime(end)
+    entrant = module.Entrant(smc.law("none"))
+    entrant.gains = lambda k: 1.0
+    module._first_sets(course(clock), [entrant], types.SimpleNamespace(says=lambda *_: None))
+    assert now[0] == pytest.approx(sum(1 + 2 * (k % 4 == 0) for k in range(judgements)))
+    assert len(entrant.J) == 1
