@@ -161,13 +161,15 @@ ROWS = {
         cold=True,
     ),
     "list": Row(functools.partial(command, "list"), "imports"),
-    "help": Row(functools.partial(command, "--help"), "imports"),
+    "help": Row(functools.partial(command, "--help"), "imports of typer and rich"),
     "identify": Row(
         identify,
         "replays by MuJoCo",
         {"replays": "smc_mujoco.identification.replays:Replays._replayed"},
     ),
-    "claims": Row(functools.partial(command, "claims"), "runs of MuJoCo", cold=True),
+    "claims": Row(
+        functools.partial(command, "claims"), "runs of MuJoCo, then their scores", cold=True
+    ),
     "demo": Row(demo, "the network, MuJoCo draws on the processor"),
     "basin": Row(basin, "the compiler, then runs of MuJoCo", cold=True),
 }
