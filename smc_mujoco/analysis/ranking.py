@@ -201,6 +201,7 @@ class Comparison:
         # the largest p-values with which a law is better than another, and wins a block
         self.limit = BEST_ERROR / looks / max(count - 1, rivals)
         self.error = WIN_ERROR / looks  # of any wrong winner
+        self.family = 1  # number of blocks for which winners are corrected
         self.winning = self.first = self.error  # after Holm's last step, and after his first
         corrected([self])
 
@@ -538,6 +539,7 @@ def corrected(comparisons: Sequence[Comparison]) -> None:
     with_rivals = [comparison for comparison in comparisons if len(comparison.laws) > 1]
     blocks = sum(len(comparison.floors) for comparison in with_rivals)
     for comparison in with_rivals:
+        comparison.family = blocks
         comparison.first = comparison.error / blocks
     p = [comparison.winner_p.min(axis=1) for comparison in with_rivals]
     for comparison in with_rivals:

@@ -1,25 +1,25 @@
 """A board: laws compared in one metric, and the verdict in each of its blocks, as facts."""
 
 import dataclasses
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 
-from smc_mujoco.analysis.bootstrap import Interval
-from smc_mujoco.analysis.paired_runs import OBJECTIVE, SETTLES, without_floor
-from smc_mujoco.analysis.ranking import Rank
+import numpy as np
+
+from smc_mujoco.analysis.bootstrap import Interval, median_of, share_interval
+from smc_mujoco.analysis.paired_runs import without_floor
+from smc_mujoco.analysis.ranking import Comparison, Rank, linked, ranks
 from smc_mujoco.answers import answers
-from smc_mujoco.answers.facts import Barred, Fact, Lead, NotRanked, Trails, Verdict
-from smc_mujoco.common.aliases import Names, Numbers, Pair
+from smc_mujoco.answers.facts import NotRanked, Verdict
+from smc_mujoco.common.aliases import Array, Names
+from smc_mujoco.common.cached import cached_property
 from smc_mujoco.common.data import keyword_dataclass
 from smc_mujoco.common.text import joined
 from smc_mujoco.control.source import Source
 from smc_mujoco.metrics.catalogue import CATALOGUE
+from smc_mujoco.studies.block import Block, label_of
 
-LABELS = {SETTLES: answers.SHARE, OBJECTIVE: answers.ON_PLANT}
-
-
-def label_of(metric: str) -> str:
-    """Return a metric in words, such as "final error"."""
-    return LABELS.get(metric) or CATALOGUE[metric].label
+MAX_RATIO = 4.0  # of the ends of a median's interval, above which it says too little; chosen
+Sources = Mapping[str, tuple[Source, ...]]  # law -> those of its gains
 
 
 @keyword_dataclass
@@ -28,48 +28,11 @@ class BoardEntry:
 
     law: str
     interval: Interval  # of its median, or of the share of its runs that settle, over its samples
-    vague: bool  # whether the interval is too wide for the median to say enough
+    vague: bool  # whether the median is not known within a factor of MAX_RATIO
     rank: Rank
     failed: int  # number of its runs that failed, or have no value, such as those that never settle
     runs: int  # number of its runs, equal ones counted once
     sources: tuple[Source, ...] = ()  # of its gains
-
-
-@keyword_dataclass
-class Block:
-    """Laws compared on one plant in one condition. A law's name is the key of the mappings."""
-
-    plant: str
-    condition: str
-    # medians over the seeds; for "settles" the share of runs that do not settle
-    medians: Numbers
-    lacking: Mapping[str, int]  # number of runs that failed or have no value
-    best: Names  # laws that may be the best, see `ranking`
-    away: Names  # laws with runs that failed or have not arrived, which do not win
-    below: Names  # laws below the floor, which are not ranked among themselves
-    rising: Names  # laws whose median is below the floor, but need not stay there
-    floor: str  # in words, such as "0.01 rad"; "" where it is not known
-    verdict: Verdict | None  # who wins, or why nobody does; None for a single law
-    behind: Mapping[str, Trails]  # the laws that others are better than
-    not_ranked: Sequence[NotRanked]  # the laws with too few samples beside others that are ranked
-    # medians at the step and at half of it, where they differ much
-    by_step: Mapping[str, Pair]
-    # distinct runs; in the other seeds every law repeats the result of an earlier one
-    runs: int
-    sample: Fact  # what a number is of
-    bound: float  # of |u|, in the unit of u; NaN where it is not one number
-
-    @property
-    def winner(self) -> str | None:
-        """The law that is better than every other, among several."""
-        return self.verdict.law if isinstance(self.verdict, Lead) else None
-
-    @property
-    def barred(self) -> bool:
-        """Whether the law that is better than every other does not win, as others have their
-        default gains.
-        """
-        return isinstance(self.verdict, Barred) and self.verdict.defaults
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True, repr=False)
@@ -80,7 +43,9 @@ class Board:
     metric: str  # its name, or "settles"
     # of the medians, with {x} and {u} as in `Metric.unit`; "" for "settles", which is 0 to 1
     unit: str
-    entries: tuple[BoardEntry, ...]  # lowest mean rank first
+    comparison: Comparison
+    sets: Mapping[str, Array]  # law -> the number of the set of gains of each run
+    sources: Sources
     blocks: tuple[Block, ...]  # the same laws in each condition
     # whether halving the physics step may change its numbers, and no run was repeated with it
     by_step: bool
@@ -89,6 +54,31 @@ class Board:
 
     def __repr__(self) -> str:
         return f"{self.about}: {'; '.join(self.lines)}"
+
+    @cached_property
+    def entries(self) -> tuple[BoardEntry, ...]:
+        """The laws, lowest mean rank first."""
+        return tuple(map(self._entry, ranks(self.comparison)))
+
+    def _entry(self, rank: Rank) -> BoardEntry:
+        """Return the entry of a law."""
+        compared = self.comparison
+        i = compared.laws.index(rank.law)
+        values = compared.cells[i]
+        interval = median_of(values, linked(*np.atleast_2d(self.sets[rank.law])))
+        vague = interval.high > MAX_RATIO * max(interval.low, compared.floors.min())
+        if compared.shares:
+            share = float(1 - np.nanmean(values, axis=1).mean())
+            interval = share_interval(share, interval.n)
+        return BoardEntry(
+            law=rank.law,
+            interval=interval,
+            vague=vague and not compared.shares,
+            rank=rank,
+            failed=int(compared.without_value[i].sum()),
+            runs=int((~np.isnan(values)).sum()),
+            sources=self.sources.get(rank.law, ()),
+        )
 
     @property
     def best(self) -> Names:

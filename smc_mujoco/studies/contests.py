@@ -8,7 +8,8 @@ from smc_mujoco.answers.facts import Contest, Fact, Lead, NotRanked, Open, Settl
 from smc_mujoco.common.aliases import Names
 from smc_mujoco.common.tabular import Cell, Tabular
 from smc_mujoco.common.text import counted, joined
-from smc_mujoco.studies.board import Block, Board
+from smc_mujoco.studies.block import Block
+from smc_mujoco.studies.board import Board
 from smc_mujoco.studies.board_numbers import heading, in_order, size
 
 RATE = "tv_rate"  # the metric that is also given as a share of the bound on u

@@ -15,7 +15,6 @@ from typing import NamedTuple
 import numpy as np
 
 from smc_mujoco.analysis import paired_runs
-from smc_mujoco.analysis.bootstrap import Interval, median_of, share_interval
 from smc_mujoco.analysis.paired_runs import (
     EPS,
     OBJECTIVE,
@@ -24,7 +23,7 @@ from smc_mujoco.analysis.paired_runs import (
     RunColumns,
     RunGroup,
 )
-from smc_mujoco.analysis.ranking import Comparison, corrected, linked, ranks
+from smc_mujoco.analysis.ranking import Comparison, corrected
 from smc_mujoco.analysis.relevant import RELEVANT
 from smc_mujoco.analysis.step_halving import first_order, repeats_every_run
 from smc_mujoco.common.aliases import Array, Names
@@ -33,13 +32,11 @@ from smc_mujoco.common.text import joined
 from smc_mujoco.control.source import DEFAULT, Source
 from smc_mujoco.metrics.catalogue import CATALOGUE
 from smc_mujoco.simulation.scenario import Scenario
-from smc_mujoco.studies.board import Block, Board, BoardEntry
+from smc_mujoco.studies.block import Block
+from smc_mujoco.studies.board import Board, Sources
 from smc_mujoco.studies.board_tables import Boards
-from smc_mujoco.studies.verdicts import BlockComparison
 
 METRICS = (SETTLES, "settling_time", "ultimate_bound", "itae", "tv_rate")
-MAX_RATIO = 4.0  # of the ends of a median's interval, above which it says too little; chosen
-Sources = Mapping[str, tuple[Source, ...]]  # law -> those of its gains
 
 
 class Holdout(NamedTuple):
@@ -108,13 +105,11 @@ def leaderboard(
     by_metric = []
     for metric in dict.fromkeys(metrics):
         by_row = paired_runs.by_row(table, metric)
-        contests = {}
-        for i, group in enumerate(groups):
-            if contest := _contest(group, by_row, metric, relevant):
-                contests[i] = contest
-        by_metric.append(dict(zip(contests, _boards([*contests.values()], defaults), strict=True)))
-    for i in range(len(groups)):
-        boards += [of_metric[i] for of_metric in by_metric if i in of_metric]
+        of_metric = [_board(group, by_row, metric, relevant, defaults) for group in groups]
+        corrected([board.comparison for board in filter(None, of_metric)])
+        by_metric.append(of_metric)
+    for of_group in zip(*by_metric, strict=True):
+        boards += filter(None, of_group)
     boards.absent = _absent(metrics, groups)
     return boards
 
@@ -130,22 +125,6 @@ class SourcedGroup(NamedTuple):
     def runs(self) -> list[Scenario]:
         """The scenarios that are known."""
         return list(filter(None, self.ran))
-
-
-class MetricContest(NamedTuple):
-    """The laws of a group, compared in a metric."""
-
-    group: Mapping[str, str]  # what the runs have in common
-    metric: str
-    comparison: Comparison
-    blocks: Sequence[tuple[str, str]]  # plant and condition
-    seeds: Sequence[int]  # of each block
-    ran: Sequence[Scenario | None]  # a scenario of each block
-    sets: Mapping[str, Array]  # law -> the number of the set of gains of each run
-    sources: Sources
-    unit: str
-    x: str = ""  # the unit of positions
-    summed: Names = ()  # conditions whose runs a number sums
 
 
 def _absent(metrics: Sequence[str], groups: Sequence[SourcedGroup]) -> list[str]:
@@ -179,9 +158,9 @@ def _commands(groups: Sequence[SourcedGroup]) -> list[str]:
     return [*dict.fromkeys(words)]
 
 
-def _contest(
-    group: SourcedGroup, by_row: paired_runs.ByRow, metric: str, relevant: float
-) -> MetricContest | None:
+def _board(
+    group: SourcedGroup, by_row: paired_runs.ByRow, metric: str, relevant: float, defaults: bool
+) -> Board | None:
     """Compare the laws of a group in a metric; None where it does not apply."""
     judged = [paired_runs.is_judged(scenario, metric) for scenario in group.ran]
     scores = group.group.scores(by_row, judged)
@@ -201,16 +180,33 @@ def _contest(
         first_order=[scenario is not None and first_order(scenario) for scenario in ran],
         powers=list(map(paired_runs.trend_power, ran)),
     )
-    return MetricContest(
+    untuned = () if defaults else _untuned(group.sources)
+    blocks = []
+    for at, (k, scenario) in enumerate(zip(scores.blocks, ran, strict=True)):
+        plant, condition = group.group.blocks[k]
+        blocks.append(
+            Block(
+                comparison=comparison,
+                at=at,
+                metric=metric,
+                plant=plant,
+                condition=condition,
+                seeds=group.group.seeds[k],
+                floor=paired_runs.floor_words(scenario, metric),
+                untuned=untuned,
+                bound=_bound(scenario),
+            )
+        )
+    repeated = not np.isnan(comparison.halves).all()
+    return Board(
         group=group.group.name,
         metric=metric,
+        unit=_unit(metric, ran),
         comparison=comparison,
-        blocks=[group.group.blocks[k] for k in scores.blocks],
-        seeds=[group.group.seeds[k] for k in scores.blocks],
-        ran=ran,
         sets=scores.sets,
         sources=group.sources,
-        unit=_unit(metric, ran),
+        blocks=tuple(blocks),
+        by_step=not repeated and any(map(repeats_every_run, filter(None, ran))),
         x=paired_runs.unit_of_x(group.group.name["plant"], group.ran),
     )
 
@@ -222,7 +218,7 @@ def objective_boards(
 
     `sources` is by plant. Others as in `leaderboard`.
     """
-    contests = []
+    boards = []
     for plant, runs in holdout.items():
         comparison = Comparison(
             runs.values,
@@ -232,43 +228,33 @@ def objective_boards(
             halves=runs.halves,
             arrived=runs.arrived,
         )
-        contest = MetricContest(
+        block = Block(
+            comparison=comparison,
+            metric=OBJECTIVE,
+            plant=plant,
+            condition="unseen runs",
+            seeds=int(comparison.seeds[0]),
+            untuned=() if defaults else _untuned(sources[plant]),
+        )
+        board = Board(
             group={"plant": plant},
             metric=OBJECTIVE,
-            comparison=comparison,
-            blocks=[(plant, "unseen runs")],
-            seeds=[int(comparison.seeds[0])],
-            ran=[None],
-            sets={law: np.atleast_2d(numbers) for law, numbers in runs.sets.items()},
-            sources=sources[plant],
             unit=UNITS[OBJECTIVE],
+            comparison=comparison,
+            sets=runs.sets,
+            sources=sources[plant],
+            blocks=(block,),
+            by_step=False,
             summed=runs.conditions,
         )
-        contests.append(contest)
-    return _boards(contests, defaults)
-
-
-def _boards(contests: Sequence[MetricContest], defaults: bool) -> list[Board]:
-    """Return the boards of contests in a metric, whose winners are corrected for all of them."""
-    comparisons = [contest.comparison for contest in contests]
-    corrected(comparisons)
-    family = sum(len(compared.floors) for compared in comparisons if len(compared.laws) > 1) or 1
-    boards = []
-    for contest in contests:
-        repeated = not np.isnan(contest.comparison.halves).all()
-        blocks = [_block(contest, k, defaults, family) for k in range(len(contest.blocks))]
-        board = Board(
-            group=contest.group,
-            metric=contest.metric,
-            unit=contest.unit,
-            entries=_entries(contest.comparison, contest.sets, contest.sources),
-            blocks=tuple(blocks),
-            by_step=not repeated and any(map(repeats_every_run, filter(None, contest.ran))),
-            x=contest.x,
-            summed=contest.summed,
-        )
         boards.append(board)
+    corrected([board.comparison for board in boards])
     return boards
+
+
+def _untuned(sources: Sources) -> Names:
+    """Return the laws with default gains."""
+    return tuple(law for law, of_law in sources.items() if any(map(_is_default, of_law)))
 
 
 def _is_default(source: Source) -> bool:
@@ -291,64 +277,3 @@ def _unit(metric: str, ran: Sequence[Scenario | None]) -> str:
         return UNITS[metric]
     bracketed = effort if effort.isalpha() else f"({effort})"
     return UNITS[metric].replace("({u})", bracketed).replace("{u}", effort)
-
-
-def _block(contest: MetricContest, at: int, defaults: bool, family: int) -> Block:
-    """Return a block of a contest; `defaults`: whether a law may win over default gains."""
-    comparison, scenario = contest.comparison, contest.ran[at]
-    untuned = []
-    if not defaults:
-        untuned = [law for law, of_law in contest.sources.items() if any(map(_is_default, of_law))]
-    floor = paired_runs.floor_words(scenario, contest.metric)
-    block = BlockComparison(comparison, at, contest.metric, floor, family, tuple(untuned))
-    changes = {law: comparison.step_change(at, law) for law in comparison.laws}
-    plant, condition = contest.blocks[at]
-    return Block(
-        plant=plant,
-        condition=condition,
-        medians=block.by_law(comparison.centres),
-        lacking=block.by_law(comparison.without_value),
-        best=block.named(comparison.best),
-        away=block.away,
-        below=block.named(comparison.below),
-        rising=block.named((comparison.centres <= comparison.floors) & ~comparison.below),
-        floor=floor,
-        verdict=block.verdict,
-        behind=block.behind,
-        not_ranked=block.not_ranked,
-        by_step={law: change for law, change in changes.items() if change},
-        runs=int(comparison.seeds[at]),
-        sample=block.sample(contest.seeds[at]),
-        bound=_bound(scenario),
-    )
-
-
-def _entries(
-    comparison: Comparison, sets: Mapping[str, Array], sources: Sources
-) -> tuple[BoardEntry, ...]:
-    """Return the entries of all laws."""
-    entries = []
-    for rank in ranks(comparison):
-        i = comparison.laws.index(rank.law)
-        values = comparison.cells[i]
-        interval = median_of(values, linked(*sets[rank.law]))
-        if comparison.shares:
-            share = float(1 - np.nanmean(values, axis=1).mean())
-            interval = share_interval(share, interval.n)
-        entries.append(
-            BoardEntry(
-                law=rank.law,
-                interval=interval,
-                vague=not comparison.shares and _vague(interval, comparison.floors.min()),
-                rank=rank,
-                failed=int(comparison.without_value[i].sum()),
-                runs=int((~np.isnan(values)).sum()),
-                sources=sources.get(rank.law, ()),
-            )
-        )
-    return tuple(entries)
-
-
-def _vague(interval: Interval, floor: float) -> bool:
-    """Return whether a median is not known within a factor of MAX_RATIO."""
-    return interval.high > MAX_RATIO * max(interval.low, floor)

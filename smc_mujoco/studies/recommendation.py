@@ -30,10 +30,10 @@ from smc_mujoco.simulation.force_bounds import bounds_in_words
 from smc_mujoco.simulation.run import run
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
+from smc_mujoco.studies.block import nearest
 from smc_mujoco.studies.board_tables import Boards
 from smc_mujoco.studies.race import LOOKS, WITHOUT, Race, needed
 from smc_mujoco.studies.table import Table
-from smc_mujoco.studies.verdicts import nearest
 
 RELIABLE = 0.9  # share of the runs of every condition in which a reliable law settles; chosen
 FAR_OVER = 20.0  # %, an overshoot beyond which the answer says so; chosen

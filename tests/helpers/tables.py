@@ -1,5 +1,6 @@
 """Tables of made-up runs, in place of a study's."""
 
+import copy
 import json
 import math
 
@@ -59,3 +60,10 @@ def table_of(scores: dict[str, np.ndarray], metric: str = "itae", **columns) -> 
         seed=np.tile(np.arange(seeds), len(scores) * conditions),
         **columns,
     )
+
+
+def changed(block, **facts):
+    """Return a block of a board with other facts than its comparison's."""
+    other = copy.copy(block)
+    other.__dict__.update(facts)
+    return other

@@ -11,7 +11,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
-from helpers.tables import MadeTable, table_of
+from helpers.tables import MadeTable, changed, table_of
 from hypothesis import example, given
 from hypothesis import strategies as st
 
@@ -25,11 +25,11 @@ from smc_mujoco.common.tabular import TEX, plain
 from smc_mujoco.common.text import number, span
 from smc_mujoco.draw import dot_plot
 from smc_mujoco.metrics.catalogue import CATALOGUE
+from smc_mujoco.studies.block import Block
 from smc_mujoco.studies.board import Board
 from smc_mujoco.studies.board_numbers import size, sizes
 from smc_mujoco.studies.board_tables import Boards
 from smc_mujoco.studies.leaderboard import leaderboard
-from smc_mujoco.studies.verdicts import BlockComparison
 
 pytestmark = pytest.mark.quick
 
@@ -488,7 +488,7 @@ def pair() -> Board:
     return leaderboard(made(conditions=("nominal", "noise")), metrics=["itae"])[0]
 
 
-def verdicts_of(metric="itae", floor="0.1 m", untuned=(), samples=20, **fields) -> BlockComparison:
+def verdicts_of(metric="itae", floor="0.1 m", untuned=(), samples=20, **fields) -> Block:
     """A block of three laws in one family, the last of which wins; `fields` are arrays by law."""
 
     def column(name, default):
@@ -498,6 +498,7 @@ def verdicts_of(metric="itae", floor="0.1 m", untuned=(), samples=20, **fields) 
     comparison: Any = SimpleNamespace(
         laws=LAWS,
         shares=metric == "settles",
+        family=1,
         relevant=0.05,
         winners=[fields.pop("winner", "third")],
         centres=centres,
@@ -516,7 +517,8 @@ def verdicts_of(metric="itae", floor="0.1 m", untuned=(), samples=20, **fields) 
         visible=lambda at, law, rival: fields["visible"],
         charged=lambda at, law, rival: fields["charged"],
     )
-    return BlockComparison(comparison, 0, metric, floor, 1, untuned)
+    about: Any = {"plant": "duffing", "condition": "nominal", "seeds": 20}
+    return Block(comparison=comparison, metric=metric, floor=floor, untuned=untuned, **about)
 
 
 TWO = (True, True, False)
@@ -634,7 +636,7 @@ def test_over_several_conditions_each_verdict_stands_once(pair):
     fact: Any = pair.blocks[0].verdict
     assert f"ratio {number(fact.ratio)}" in repr(pair)
     first, second = pair.blocks
-    turned = dataclasses.replace(second, verdict=Lead(law="second", rival="", metric="ITAE"))
+    turned = changed(second, verdict=Lead(law="second", rival="", metric="ITAE"))
     split = dataclasses.replace(pair, blocks=(first, turned)).lines
     assert ["third" in split[0], "nominal" in split[0]] == [True, True]
     assert ["second" in split[1], "noise" in split[1]] == [True, True]
@@ -646,7 +648,7 @@ def test_a_law_that_is_not_ranked_is_named_beside_the_winner_of_the_others(pair)
     (fact,) = block.not_ranked
     unit = "sets of gains or runs"
     assert fact == NotRanked(metric="ITAE", law="second", samples=3, needed=6, unit=unit)
-    blocks = [dataclasses.replace(of_pair, not_ranked=[fact]) for of_pair in pair.blocks]
+    blocks = [changed(of_pair, not_ranked=[fact]) for of_pair in pair.blocks]
     assert dataclasses.replace(pair, blocks=tuple(blocks)).not_ranked == [fact]
 
 
@@ -678,5 +680,5 @@ def test_a_law_that_others_beat_has_its_ratio_to_the_law_in_front(pair):
 )
 def test_a_heading_says_if_some_laws_have_more_sets_of_gains(sets, samples, said):
     block = verdicts_of(sets=sets, samples=samples)
-    assert block.sample(20).values == {"seeds": 20, "distinct": None} | said
-    assert block.sample(24).values["distinct"] == 20
+    assert block.sample.values == {"seeds": 20, "distinct": None} | said
+    assert dataclasses.replace(block, seeds=24).sample.values["distinct"] == 20

@@ -6,7 +6,7 @@ import re
 
 import numpy as np
 import pytest
-from helpers.tables import MadeTable
+from helpers.tables import MadeTable, changed
 
 from smc_mujoco.analysis.tuning import result
 from smc_mujoco.answers import answers
@@ -93,13 +93,13 @@ def test_the_numbers_of_the_screen_are_those_of_the_boards(boards, contest):
     assert said(contest.settled)[1] == f"All {len(LAWS) * SEEDS} runs settled."
     (board,) = [candidate for candidate in boards if candidate.metric == "settles"]
     unsettled = {law: i / SEEDS for i, law in enumerate(LAWS)}  # shares
-    block = dataclasses.replace(board.blocks[0], medians=unsettled)
+    block = changed(board.blocks[0], medians=unsettled)
     (apart,) = contests([boards[-1], dataclasses.replace(board, blocks=(block,))], OWN, ())
     assert apart.settled
     short = {fact.values["law"]: fact.values["runs"] for fact in apart.settled.values["short"]}
     assert short == {law: Settles(SEEDS - i, SEEDS) for i, law in enumerate(LAWS) if i}
     assert apart.settled.values["others"]
-    none = dataclasses.replace(block, medians=dict.fromkeys(LAWS, 1.0))
+    none = changed(block, medians=dict.fromkeys(LAWS, 1.0))
     (lost,) = contests([boards[-1], dataclasses.replace(board, blocks=(none,))], OWN, ())
     assert lost.settled
     assert said(lost.settled)[1] == f"No run of {len(LAWS) * SEEDS} settled."
@@ -161,10 +161,10 @@ def test_a_law_with_a_run_that_does_not_arrive_is_not_to_be_used(boards):
     """J is of other runs, in which it may arrive."""
     *first, last = boards
     (block,) = last.blocks
-    lost = dataclasses.replace(block, away=(LAWS[-1],))
+    lost = changed(block, away=(LAWS[-1],))
     (contest,) = contests([*first, dataclasses.replace(last, blocks=(lost,))], OWN, ())
     assert contest.use is None
-    elsewhere = dataclasses.replace(block, away=(LAWS[0],))
+    elsewhere = changed(block, away=(LAWS[0],))
     (contest,) = contests([*first, dataclasses.replace(last, blocks=(elsewhere,))], OWN, ())
     assert contest.use
     assert (contest.use.values["law"], contest.use.values["unless"]) == (LAWS[-1], [])
@@ -192,7 +192,7 @@ def test_of_many_contests_J_is_said_once_for_each_plant_with_the_law_to_use():
     won = dataclasses.replace(J.blocks[0].verdict, metric="J")
     even = Open(metric="J", laws=LAWS[:2], hidden=0.1)
     for verdict, said_of in ((won, [LAWS[0], f"below {LAWS[1]}"]), (even, ["Undecided", LAWS[0]])):
-        block = dataclasses.replace(J.blocks[0], verdict=verdict)
+        block = changed(J.blocks[0], verdict=verdict)
         of_plant = dataclasses.replace(J, blocks=(block,))
         (part,) = answers.blocks(Screen(contests=contests([of_plant, *boards], OWN, ())))
         assert part.tables[0].headings == ["", "", "ITAE"]
