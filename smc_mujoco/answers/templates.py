@@ -161,7 +161,11 @@ TEXTS = {
         "{objective} s², [{lower:%} below the law's own gains|{before} s² with the law's own "
         "gains|the law's own gains fail]",
     ),
-    "searches": ("searches", "{count}[ ended within {spread}]"),
+    "searches": (
+        "searches",
+        "{count}[; J of the worst is {above:%} above the best|; J of the worst is {times} times "
+        "the best]",
+    ),
     "at bound": ("at bound", f"{{gain}}, at the {{end}} end: {BEYOND}"),
     # margins
     "tolerated": (
@@ -190,9 +194,28 @@ TEXTS = {
         "{law} on {plant}: [{axis} explains {share:%} of the variance of {metric}|open which axis "
         "explains most of the {metric}]",
     ),
-    "spread": ("{metric}", "{low} to {high} in 90 % of {runs:run}"),
-    "fail": ("fail", "{runs} runs"),
-    "narrow": ("narrow", "{half} first: the median is then {median}, not {before}"),
+    "spread": (
+        "{metric}",
+        "{low} to {high} in 90 % of {runs:run}[; {unscored} have none, and count as the worst]",
+    ),
+    "fail": ("fail", "{runs} runs ({share:%})"),
+    "narrow": (
+        "narrow",
+        "{half} first: the median is then {median}, not {before}[, and {fail:%} fail, not "
+        "{failed:%}]",
+    ),
+    "first": (
+        "first",
+        "[{axis}, {median:%} ({share:%}), alone and with others|{open}open, as intervals overlap "
+        "(give more points)|no axis, as the scores do not differ, or most runs have none]",
+    ),
+    "fail where": (
+        "fail where",
+        "{where}: {runs} runs ({share:%}), elsewhere {outside}, of those that did not choose these "
+        "bounds",
+    ),
+    "fail anywhere": ("fail", "{fails}no bounds on one or two axes tell where"),
+    "checked": ("", "{text}"),
     # identify
     "fits": (
         "",

@@ -10,6 +10,7 @@ change. It is zero at the start of a run.
 import dataclasses
 import inspect
 import keyword
+import math
 import pkgutil
 import re
 import sys
@@ -224,6 +225,11 @@ def gain_text(value: GainValue) -> str:
 def gains_text(gains: Mapping[str, GainValue]) -> str:
     """Return gains as text, such as "k=3, lam=(3, 4.5)"."""
     return ", ".join(f"{name}={gain_text(value)}" for name, value in gains.items())
+
+
+def bounded(gains: Mapping[str, GainValue]) -> dict[str, GainValue]:
+    """Return the gains without those that are inf: no bound, or a number of the plant."""
+    return {name: value for name, value in gains.items() if value != math.inf}
 
 
 def _with_gains(name: str, gains: Mapping[str, GainValue]) -> str:

@@ -208,12 +208,12 @@ def verdict(boards: Sequence[Any]) -> str:
     for board in boards:
         count = len(board.blocks)
         if board.winner:
-            lines.append(f"{board.metric}: {board.winner} wins on all {count} parameter sets")
+            lines.append(f"{board.label}: {board.winner} wins on all {count} parameter sets")
             continue
         wins = Counter(filter(None, (block.winner for block in board.blocks)))
         words = []
         for law, number in wins.most_common():
             words.append(f"{law} on {number}")
         shared = ", ".join(words) or "none on any"
-        lines.append(f"{board.metric}: no law wins on all {count} parameter sets ({shared})")
+        lines.append(f"{board.label}: no law wins on all {count} parameter sets ({shared})")
     return "\n".join(lines)

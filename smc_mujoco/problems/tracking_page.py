@@ -12,7 +12,7 @@ import numpy as np
 
 from smc_mujoco.common.files import replacing
 from smc_mujoco.common.text import capital, joined, number
-from smc_mujoco.control.component import gains_text
+from smc_mujoco.control.component import bounded, gains_text
 from smc_mujoco.problems.tracking import tracking_suites
 from smc_mujoco.problems.tracking_entry import beside_of
 from smc_mujoco.problems.tracking_picture import draw, shown
@@ -105,7 +105,7 @@ def _hard_to_tell(board: TrackingBoard) -> Iterator[str]:
     """Yield a limit that names the problems in which few entries can be told apart, if any."""
     hard = []
     for result in board.problems:
-        if result.told_apart < ENOUGH and len(result.names) > 1:
+        if result.told_apart < ENOUGH and len(result.standings) > 1:
             hard.append(f"`{result.problem}`")
     if hard:
         yield f"- Fewer than a third of all pairs can be told apart in {joined(hard)}."
@@ -155,20 +155,18 @@ def problem_table(board: TrackingBoard, result: ProblemBoard) -> Iterator[str]:
     """Yield the table of a problem: the first entries, and those that no other leads."""
     yield "| entry, its gains | error, counts | other | without | u varies |"
     yield "|---|---|---|---|---|"
-    stands = [*result.names[:FIRST]]
-    stands += [name for name in result.leaders if name not in stands]
-    for name in stands:
-        better, worse = result.errors[name]
-        star = "*" if name in result.leaders else ""
-        same = "" if result.of_load(name) else " ="
-        low, high = result.intervals[name]
+    rows = [each for k, each in enumerate(result.standings) if k < FIRST or each.leads]
+    for row in rows:
+        star = "*" if row.leads else ""
+        same = "" if row.of_load else " ="
+        low, high = map(number, row.interval)
+        without, rate = number(row.counted.without), number(row.counted.rate)
         yield (
-            f"| `{name}`<br><small>{gains_text(result.gains[name])}</small> "
-            f"| {number(worse)}{star} ({number(low)} to {number(high)}) "
-            f"| {number(better)} | {number(result.without[name])}{same} "
-            f"| {number(result.rates[name])} |"
+            f"| `{row.entry}`<br><small>{gains_text(bounded(row.counted.gains))}</small> "
+            f"| {number(row.error)}{star} ({low} to {high}) | {number(row.other)} "
+            f"| {without}{same} | {rate} |"
         )
-    more = len(result.names) - len(stands)
+    more = len(result.standings) - len(rows)
     still, oracle = shipped_bounds(board.suite.name)[result.problem]
     entries = "entry" if more == 1 else "entries"
     yield ""

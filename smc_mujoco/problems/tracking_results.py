@@ -23,7 +23,7 @@ from smc_mujoco.analysis.ranking import Comparison
 from smc_mujoco.analysis.tuning import search_space
 from smc_mujoco.answers.facts import Fact, Screen, Settles
 from smc_mujoco.common import fingerprint
-from smc_mujoco.common.aliases import AnyPath, Array, Names, Numbers
+from smc_mujoco.common.aliases import AnyPath, Array, Pair
 from smc_mujoco.common.cache import CachedResult
 from smc_mujoco.common.constraints import Progress, constrained
 from smc_mujoco.common.data import keyword_dataclass
@@ -196,8 +196,21 @@ def counted_errors(found: Found, limit: float) -> Array:
     return np.where(found.rate <= limit, found.errors, np.inf)
 
 
-def _typical(found: Found, limit: float) -> float:
-    return float(np.median(counted_errors(found, limit)))
+@keyword_dataclass
+class Standing:
+    """An entry in one problem."""
+
+    entry: str
+    error: float  # counts, the median over instances of its worse search
+    other: float  # of its better search
+    interval: Pair  # 95 %, of `error`
+    counted: Found  # the worse search
+    leads: bool  # whether no other entry leads it, and it has an error
+
+    @property
+    def of_load(self) -> bool:
+        """Whether its error is of the load, and not the same without it."""
+        return self.error > SAME * self.counted.without
 
 
 @keyword_dataclass
@@ -205,20 +218,13 @@ class ProblemBoard:
     """The entries of a suite in one problem."""
 
     problem: str
-    names: Names  # least error first
-    errors: Mapping[
-        str, tuple[float, float]
-    ]  # medians over instances, counts: better, worse search
-    intervals: Mapping[str, tuple[float, float]]  # 95 %, of the median of the worse search
-    without: Mapping[str, float]  # of the worse search without the load
-    rates: Mapping[str, float]  # of the worse search, bounds a second
-    gains: Mapping[str, Numbers]  # of the worse search
-    leaders: Names  # the entries that no other leads
+    standings: tuple[Standing, ...]  # least error first
     told_apart: float  # share of the pairs in which one leads the other
 
-    def of_load(self, name: str) -> bool:
-        """Return whether an entry's error is of the load, and not the same without it."""
-        return self.errors[name][1] > SAME * self.without[name]
+    @property
+    def leaders(self) -> list[str]:
+        """The entries that no other leads."""
+        return [standing.entry for standing in self.standings if standing.leads]
 
 
 class TrackingBoard:
@@ -235,33 +241,31 @@ class TrackingBoard:
     def problem(self, name: str) -> ProblemBoard:
         """Return who stands where in a problem."""
         limit = next(task.limit for task in self.suite.problems if task.name == name)
-        better, worse, of_worse = {}, {}, {}
+        better, worse, counted = {}, {}, {}
         for entry, result in self.entries.items():
             if name in result.searches:
-                searches = sorted(result.searches[name], key=lambda found: _typical(found, limit))
-                better[entry] = counted_errors(searches[0], limit)
-                worse[entry] = counted_errors(searches[-1], limit)
-                of_worse[entry] = searches[-1]
+                pairs = [(counted_errors(each, limit), each) for each in result.searches[name]]
+                pairs.sort(key=lambda pair: float(np.median(pair[0])))
+                (better[entry], _), (worse[entry], counted[entry]) = pairs[0], pairs[-1]
         comparison = Comparison(worse, FLOOR, halves=better, rivals=RIVALS)
-        medians, intervals = {}, {}
-        for entry, errors in worse.items():
-            medians[entry] = float(np.median(better[entry])), float(np.median(errors))
-            intervals[entry] = median_of(errors[None])[1:3]
-        order = sorted(medians, key=lambda entry: medians[entry][1])
         leads = comparison.better[0]
-        pairs = len(order) * (len(order) - 1) / 2
         beaten = dict(zip(comparison.laws, leads.any(axis=0).tolist(), strict=True))
+        standings = []
+        for entry, errors in worse.items():
+            error = float(np.median(errors))
+            standing = Standing(
+                entry=entry,
+                error=error,
+                other=float(np.median(better[entry])),
+                interval=median_of(errors[None])[1:3],
+                counted=counted[entry],
+                leads=not beaten[entry] and error < math.inf,
+            )
+            standings.append(standing)
+        pairs = len(worse) * (len(worse) - 1) / 2
         return ProblemBoard(
             problem=name,
-            names=tuple(order),
-            errors=medians,
-            intervals=intervals,
-            without={entry: chosen.without for entry, chosen in of_worse.items()},
-            rates={entry: chosen.rate for entry, chosen in of_worse.items()},
-            gains={entry: chosen.gains for entry, chosen in of_worse.items()},
-            leaders=tuple(
-                entry for entry in order if not beaten[entry] and medians[entry][1] < math.inf
-            ),
+            standings=tuple(sorted(standings, key=lambda standing: standing.error)),
             told_apart=float((leads | leads.T).sum() / 2 / pairs) if pairs else 0.0,
         )
 
@@ -274,10 +278,10 @@ class TrackingBoard:
         """Return where an entry stands."""
         rows = []
         for board in self.problems:
-            first = board.names[0]
-            place = Cell(f"{1 + board.names.index(entry)}", strong=entry in board.leaders)
-            error, least = (number(board.errors[name][1]) for name in (entry, first))
-            rows.append((board.problem, place, error, first, least))
+            first, names = board.standings[0], [standing.entry for standing in board.standings]
+            place = Cell(f"{1 + names.index(entry)}", strong=entry in board.leaders)
+            error, least = number(board.standings[names.index(entry)].error), number(first.error)
+            rows.append((board.problem, place, error, first.entry, least))
         headings = "problem", "place", "error", "first", "its error"
         count = sum(entry in board.leaders for board in self.problems)
         level = Settles(count, len(rows)) if count else None
@@ -302,9 +306,10 @@ def relative_errors(board: TrackingBoard) -> dict[str, list[float]]:
     """Return entry -> its error over the least of each problem, of its worse search."""
     ratios: dict[str, list[float]] = {name: [] for name in board.entries}
     for result in board.problems:
-        least = min(worse for _, worse in result.errors.values())
-        for name, (_, worse) in result.errors.items():
-            ratios[name].append(worse / least if worse > least else 1.0)
+        least = result.standings[0].error
+        for standing in result.standings:
+            worse = standing.error > least
+            ratios[standing.entry].append(standing.error / least if worse else 1.0)
     return ratios
 
 

@@ -29,9 +29,10 @@ from smc_mujoco.analysis.bootstrap import Interval, share_interval
 from smc_mujoco.analysis.engine import Device
 from smc_mujoco.analysis.engine.scored_runs import ScoredRuns, worth_compiling
 from smc_mujoco.answers.answer import Answer
+from smc_mujoco.answers.answers import lines_of
 from smc_mujoco.answers.command import again
 from smc_mujoco.answers.facts import Fact, NextStep, Screen, Settles, Span
-from smc_mujoco.common.aliases import Array, ArrayPair
+from smc_mujoco.common.aliases import Array, ArrayPair, Fields
 from smc_mujoco.common.constraints import Progress, Seed, Whole, constrained
 from smc_mujoco.common.data import attributes
 from smc_mujoco.common.errors import ScenarioError, shown
@@ -94,30 +95,19 @@ class Sensitivity(Answer, SobolResult):
     @property
     def screen(self) -> Screen:
         """The answer: what explains the score, where runs fail, and what to narrow first."""
-        low, high = np.quantile(self.values, [0.05, 0.95])
         rows = []
         for axis in self.axes:
             rows.append((in_words(axis.name), _percent(axis.total).text, _trend(axis)))
         headings = "", "explains, with others (%)", "more of it is"
-        half = self.improvement
         first = self.leading
         finer = NextStep(again({"--points": f"{2 * len(self.values)}"}), "narrows the intervals")
-        metric, runs = self.label, len(self.failed)
-        facts = [
-            Fact("spread", metric=metric, low=self.text(low), high=self.text(high), runs=runs),
-            Fact("fail", runs=Settles(int(self.failed.sum()), runs)),
-        ]
-        if half:
-            medians = {"median": self.text(half.median), "before": self.text(half.before)}
-            facts.append(Fact("narrow", half=_words(self.space, [half.half]), **medians))
         about = {"law": self.scenario.law.name, "plant": self.scenario.plant.name}
         if first:
-            share = Span(first.total.low, first.total.high)
-            about |= {"axis": in_words(first.name), "share": share}
+            about |= {"axis": in_words(first.name), "share": _ends(first.total)}
         return Screen(
-            heading=Fact("explains", **about, metric=metric),
+            heading=Fact("explains", **about, metric=self.label),
             tables=[Tabular(headings=headings, rows=rows)],
-            facts=facts,
+            facts=self._facts,
             next=finer,
             word="sensitivity",
         )
@@ -125,7 +115,7 @@ class Sensitivity(Answer, SobolResult):
     @property
     def leading(self) -> Axis | None:
         """The axis that explains most; None if the intervals do not tell."""
-        if not self.axes or not np.ptp(self.values) or 2 * self.unscored > len(self.values):
+        if not self._differs:
             return None
         first, *further = self.axes
         apart = all(axis.total.high <= first.total.low for axis in further)
@@ -141,45 +131,46 @@ class Sensitivity(Answer, SobolResult):
         return f"{CATALOGUE[self.metric].text(value)} {self.unit}".strip()
 
     @property
-    def sentences(self) -> list[str]:
-        """The result: the spread, what explains it, where runs fail, and what to narrow."""
+    def _facts(self) -> list[Fact]:
+        """The spread of the score, how many runs fail, and what to narrow first."""
         low, high = np.quantile(self.values, [0.05, 0.95])
-        n = len(self.failed)
-        lines = [
-            f"The {self.label} of 90 % of {n} runs is {self.text(low)} to {self.text(high)}; "
-            f"{self.unscored} runs have none, and count as the worst.",
-            f"First: {self._first}.",
-            f"Failed: {_rate(share_interval(float(self.failed.mean()), n))}; a run also fails if "
-            "it ends beyond 5 % of its scale.",
-        ]
-        for region in self.regions:
-            rates = f"{_rate(region.rate)}, elsewhere {_rate(region.outside)}"
-            lines.append(
-                f"Failed where {_words(self.space, region.cuts)}: {rates}, of the runs that did "
-                "not choose these bounds."
-            )
-        if self.failed.any() and not self.regions:
-            lines.append("No bounds on one or two axes tell where runs fail.")
+        runs = len(self.failed)
+        ends = {"low": self.text(low), "high": self.text(high), "unscored": self.unscored or None}
+        rate = _rate(share_interval(float(self.failed.mean()), runs))
+        facts = [Fact("spread", metric=self.label, runs=runs, **ends), Fact("fail", **rate)]
         if half := self.improvement:
-            change = f"the median is {self.text(half.median)} in place of {self.text(half.before)}"
-            if half.failed_before:
-                share, before = 100 * half.failed, 100 * half.failed_before
-                change += f", and {share:.0f} % fail in place of {before:.0f} %"
-            lines.append(f"Narrow first: {_words(self.space, [half.half])}; then {change}.")
-        if self.checked:
-            lines.append(f"{self.checked}.")
-        return lines
+            narrow = Fact(
+                "narrow",
+                half=_words(self.space, [half.half]),
+                median=self.text(half.median),
+                before=self.text(half.before),
+                fail=half.failed if half.failed_before else None,
+                failed=half.failed_before,
+            )
+            facts.append(narrow)
+        return facts
 
     @property
-    def _first(self) -> str:
-        """The axis that explains most, if the intervals tell."""
-        if not self.axes or not np.ptp(self.values) or 2 * self.unscored > len(self.values):
-            return "no axis, as the scores do not differ, or most runs have none"
-        first = self.leading
-        if first is None:
-            return "open, as intervals overlap (give more points)"
-        share = _percent(first.total)
-        return f"{in_words(first.name)}, {share.text} % ({share.below} %), alone and with others"
+    def sentences(self) -> list[str]:
+        """The evidence: the spread, what explains it, where runs fail, and what to narrow."""
+        leading = self.leading
+        about = {"open": self._differs}
+        if leading:
+            of_axis = {"median": leading.total.median, "share": _ends(leading.total)}
+            about = {"axis": in_words(leading.name), **of_axis}
+        facts = [Fact("first", **about), *self._facts]
+        for region in self.regions:
+            where = _words(self.space, region.cuts)
+            outside = Fact("fail", **_rate(region.outside))
+            facts.append(Fact("fail where", where=where, outside=outside, **_rate(region.rate)))
+        facts.append(Fact("fail anywhere", fails=self.failed.any() and not self.regions))
+        facts.append(Fact("checked", text=self.checked))
+        return [": ".join(filter(None, line)) for line in lines_of(facts)]
+
+    @property
+    def _differs(self) -> bool:
+        """Whether there are scores that an axis may explain."""
+        return bool(self.axes and np.ptp(self.values) and 2 * self.unscored <= len(self.values))
 
     @property
     def tables(self) -> list[Tabular]:
@@ -432,10 +423,14 @@ def _score(trace: Trace, metric: str) -> float:
     return entry.absent if math.isnan(value) else value
 
 
-def _rate(rate: Interval) -> str:
-    """Return a share of runs as words, with its interval."""
-    share = _percent(rate)
-    return f"{round(rate.median * rate.n)} of {rate.n} ({share.below} %)"
+def _rate(rate: Interval) -> Fields:
+    """Return how many of some runs fail, and the interval of their share."""
+    return {"runs": Settles(round(rate.median * rate.n), rate.n), "share": _ends(rate)}
+
+
+def _ends(share: Interval) -> Span:
+    """Return the ends of an interval."""
+    return Span(share.low, share.high)
 
 
 def _words(space: Space, cuts: Sequence[Cut]) -> str:

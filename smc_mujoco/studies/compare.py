@@ -3,7 +3,6 @@
 import contextlib
 import dataclasses
 import itertools
-import math
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -39,7 +38,7 @@ from smc_mujoco.common.files import replacing
 from smc_mujoco.common.tabular import Tabular, commented, plain
 from smc_mujoco.common.text import counted, joined, number, span
 from smc_mujoco.control import gain_sets, source
-from smc_mujoco.control.component import Template, gains_text
+from smc_mujoco.control.component import Template, bounded, gains_text
 from smc_mujoco.control.law import Law, catalogue, suits
 from smc_mujoco.control.properties import suitable
 from smc_mujoco.draw import wording
@@ -144,8 +143,8 @@ class Compared(Answer):
         for plant, candidates in self.candidates.items():
             of_plant = gains.setdefault(plant, {})
             for law, *_ in candidates:
-                finite = {k: v for k, v in law.gains.items() if v != math.inf}
-                of_plant[law.name] = ", ".join(f"{k}={v:.3g}" for k, v in finite.items())
+                finite = bounded(law.gains).items()
+                of_plant[law.name] = ", ".join(f"{name}={value:.3g}" for name, value in finite)
                 if law.name not in catalogue():
                     own[law.name] = None
         return contests(self.leaderboard, gains, tuple(own))
@@ -324,17 +323,12 @@ class Compared(Answer):
         notes = self.remarks
         for plant, candidates in self.candidates.items():
             for law, sets, _ in candidates:
-                # inf: no bound, or a number of the plant
-                best = {}
-                for k, v in law.gains.items():
-                    if v != math.inf:
-                        best[k] = v
                 if len(sets) > 1 and BEST_SET not in notes:
                     notes = [BEST_SET, *notes]
                 search = law.source.search
                 tried, apart = (f"{search.evaluations}", search.apart) if search else ("", "")
-                of_law = law.source.words, f"{len(sets)}", tried, apart, gains_text(best)
-                gains.append((plant, law.name, *of_law))
+                about = law.source.words, f"{len(sets)}", tried, apart
+                gains.append((plant, law.name, *about, gains_text(bounded(law.gains))))
         return Tabular(headings=GAINS, rows=gains, title="Gains", notes=notes, name_columns=7)
 
     @property

@@ -21,7 +21,7 @@ from smc_mujoco.common import html
 from smc_mujoco.common.cached import cached_property
 from smc_mujoco.common.tabular import Cell, Tabular
 from smc_mujoco.common.text import counted, joined, number, span
-from smc_mujoco.control.component import Component, gains_text
+from smc_mujoco.control.component import Component, bounded, gains_text
 from smc_mujoco.control.source import in_words
 from smc_mujoco.metrics.catalogue import CATALOGUE
 from smc_mujoco.metrics.conventions import leans
@@ -41,6 +41,7 @@ NO_ROOM = 1.5  # times the delay of a condition: a margin within that leaves no 
 LEAST_DELAY = 5e-3  # s, of a usual loop with a bus and a filter; a margin below is told; chosen
 MOST_NAMED = 5  # laws that a line names
 MORE_MINUTES = 30  # of a next step, where the time that is needed is not known
+HARDER = ("sine", "step", "pulse")  # conditions in which more is asked of a law
 LATER = 1.2  # times an estimate: a time that it is likely to keep
 NOWHERE = Span(math.nan, math.nan)
 Settled = dict[str, dict[str, tuple[int, int]]]  # law -> condition -> runs that settle, and all
@@ -293,7 +294,7 @@ class Recommendation(Answer):
 
     def _gains(self, kind: str) -> Fact:
         """Return the gains of the law, and the file that has them."""
-        gains = gains_text(self.law.gains)
+        gains = gains_text(bounded(self.law.gains))
         return Fact(kind, law=self.law.name, gains=gains, unit=self.unit, file=self._file)
 
     @property
@@ -432,7 +433,7 @@ class Recommendation(Answer):
     @property
     def next_step(self) -> NextStep:
         """The one thing to do next: more sets of gains, the conditions all at once, the laws that
-        were not tried, or the law's code.
+        were not tried, or the law's code; where none is needed, a harder condition.
         """
         minutes = str(self.minutes_needed or MORE_MINUTES)
         if self.form in ("undecided", "untried") or self.race.unsearched or self.left_out:
@@ -446,11 +447,21 @@ class Recommendation(Answer):
             names = "+".join(self.settled[self.law.name])
             combined = again({"--condition": names, "--out": f"{self.folder}-at-once"})
             return NextStep(combined, "searches gains for all conditions at once")
+        if self.form == "unneeded" and self.runs.count == self.runs.total:
+            asked = "+".join(self.settled[self.law.name]).split("+")
+            harder = next((name for name in HARDER if name not in asked), HARDER[-1])
+            command = again({"--condition": harder, "--out": f"{self.folder}-{harder}"})
+            return NextStep(command, "asks for more, so that a law may be needed")
         if self.untried_laws:
             options = {"--law": None, "--minutes": str(MORE_MINUTES)}
             wide = again(options | {"--out": f"{self.folder}-all-laws"}, ("--quick",))
             count = len(self.untried_laws)
             return NextStep(wide, f"tries the usual ones of {count} other laws, too")
+        return self._export
+
+    @property
+    def _export(self) -> NextStep:
+        """The law's code: as C where the loop is the user's, else for ros2_control."""
         gains = self._file or gains_text(self.law.gains).replace(" ", "")
         law = self._file or f"{self.law.name}({gains})"
         for word in typed("--law").split(","):
@@ -501,7 +512,7 @@ class Recommendation(Answer):
                 far = self.race.dropped.get(name)
                 remark = f"dropped: best J {number(far)} times the leader's worst" if far else ""
                 law = laws.get(name)
-                gains = gains_text(law.gains) if law else ""
+                gains = gains_text(bounded(law.gains)) if law else ""
                 cell = Cell(_cost(medians[name]), span(_cost(min(J)), _cost(max(J))))
                 rows.append(
                     (name, cell, f"{len(J)}", gains, *_of_rest(self.rests.get(name)), remark)

@@ -89,7 +89,6 @@ def test_tuned_gains_are_compared_with_the_law_s_own():
         objective=0.3,
         before=0.4,
         searches=(1, 2, 3),
-        search=SimpleNamespace(apart="4 %"),
         spread=0.04,
         at_bound={"kd": "upper"},
         budget=8,
@@ -98,7 +97,7 @@ def test_tuned_gains_are_compared_with_the_law_s_own():
     assert says["gains"] == "kp=2, kd=3"
     assert says["J"].startswith("0.300 s²")
     assert "25 % below" in says["J"]
-    assert says["searches"] == "3 ended within 4 %"
+    assert says["searches"] == "3; J of the worst is 4 % above the best"
     assert ("kd" in says["at bound"], "upper" in says["at bound"]) == (True, True)
     tuning.before = 0.2
     assert "0.200 s² with the law's own gains" in facts(Tuned.screen.fget(tuning))["J"]  # pyright: ignore[reportOptionalCall]
@@ -107,12 +106,15 @@ def test_tuned_gains_are_compared_with_the_law_s_own():
 
 
 def test_a_sensitivity_says_its_spread_its_failures_and_what_to_narrow():
-    half = SimpleNamespace(half=("mass", 0.7, 1.0), before=0.4, median=0.1)
+    half = SimpleNamespace(
+        half=("mass", 0.7, 1.0), before=0.4, median=0.1, failed=0.0, failed_before=0.0
+    )
     analysis: Any = SimpleNamespace(
         values=np.linspace(0.0, 1.0, 101),
         failed=np.arange(101) < 7,
         axes=[],
         improvement=half,
+        unscored=0,
         leading=SimpleNamespace(name="mass", total=SimpleNamespace(low=0.3, high=0.6)),
         label="rms error",
         text=lambda value: f"{value:.2f} m",
@@ -121,10 +123,11 @@ def test_a_sensitivity_says_its_spread_its_failures_and_what_to_narrow():
     )
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("smc_mujoco.robustness.sensitivity._words", lambda space, cuts: cuts[0][0])
+        analysis._facts = Sensitivity._facts.fget(analysis)  # pyright: ignore[reportOptionalCall]
         screen = Sensitivity.screen.fget(analysis)  # pyright: ignore[reportOptionalCall]
     says = facts(screen)
     assert says["rms error"] == "0.05 m to 0.95 m in 90 % of 101 runs"
-    assert says["fail"] == "7 of 101 runs"
+    assert says["fail"] == "7 of 101 runs (3.4 to 14 %)"
     assert says["narrow"] == "mass first: the median is then 0.10 m, not 0.40 m"
     assert "mass explains 30 to 60 % of the variance" in said(screen.heading)[1]
 

@@ -42,9 +42,9 @@ def test_every_set_is_a_condition_with_its_own_numbers():
 
 
 def test_the_verdict_says_where_one_law_wins():
-    won = SimpleNamespace(metric="tv", winner="pid", blocks=[None, None])
+    won = SimpleNamespace(label="tv", winner="pid", blocks=[None, None])
     blocks = [SimpleNamespace(winner=name) for name in ("pid", None, "pid")]
-    split = SimpleNamespace(metric="iae", winner=None, blocks=blocks)
+    split = SimpleNamespace(label="iae", winner=None, blocks=blocks)
     assert ensemble.verdict([won, split]).splitlines() == [
         "tv: pid wins on all 2 parameter sets",
         "iae: no law wins on all 3 parameter sets (pid on 2)",

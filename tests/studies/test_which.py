@@ -217,6 +217,7 @@ def test_no_law_is_the_answer_where_it_has_the_lowest_J(tmp_path):
     assert recommended.lead
     assert recommended.lead.rival == bad.name
     assert recommended.lines[0].startswith("No law")
+    assert "conditions='sine'" in recommended.next_step.command  # not other laws
     half = dataclasses.replace(recommended, settled={race.WITHOUT: {"nominal": (1, 2)}})
     assert "needed" not in half.lines[0]
     assert "is better than u = 0, which settles 1 of 2 runs" in half.lines[0]

@@ -117,7 +117,12 @@ class Tuned(Answer):
                 lower=lower if lower > 0.0 and math.isfinite(self.before) else None,
                 before=self.before if math.isfinite(self.before) else None,
             ),
-            Fact("searches", count=len(self.searches), spread=self.search.apart),
+            Fact(
+                "searches",
+                count=len(self.searches),
+                above=self.spread if 0.0 < self.spread < 1.0 else None,
+                times=1.0 + self.spread if self.spread >= 1.0 else None,
+            ),
         ]
         for gain, end in self.at_bound.items():
             facts.append(Fact("at bound", gain=gain, end=end))
