@@ -281,6 +281,8 @@ def _winners(contests: Sequence[Contest]) -> ScreenPart:
             ((label, text),) = verdict_lines([fact])
             undecided = advice and advice.values["rivals"]  # which says all of it
             verdict = None if undecided else f"{label}: {text}"
+            if isinstance(fact, Barred):  # as its cells say
+                verdict = text
             of_plants[contest.plant] = said(Fact("of plant", advice=advice, verdict=verdict))[1]
     heads = ["", "", *metrics]
     return ScreenPart(

@@ -177,6 +177,7 @@ TEXTS = {
     "on plant": ("", "{kinds} on {plant}"),
     "gains are": ("", "{gains}."),
     "most": ("", "* more than any other of these laws, by more than the search resolves."),
+    "no most": ("open", "no law is shown to tolerate the most {kinds}"),
     "fails": ("fails", "unchanged: {laws:,}"),
     # worst
     "attacked": (

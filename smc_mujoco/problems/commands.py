@@ -8,6 +8,7 @@ import typer
 from smc_mujoco.cli.commands import options
 from smc_mujoco.cli.console import Terminal, importing
 from smc_mujoco.common.errors import find, printable
+from smc_mujoco.common.text import counted
 
 Folder = Annotated[
     str, typer.Argument(metavar="FOLDER", help="A law and entry.toml, or a law of the library.")
@@ -89,11 +90,13 @@ def enter(
     target = entering.enter(folder, suite, seed, results, instances, verify)
     loaded = load(target.parent)
     (name,) = [name for name, entry in loaded.entries.items() if entry.folder == target]
+    terminal.note(f"{printable(name)} in {loaded.title}")
     terminal.print(loaded.places(name), "")
     about = loaded.entries[name].about
     for failure in about["failures"]:
         terminal.note(f"failed: {printable(failure)}")
-    runs = f"{about['instances']} instances of seed {seed}, {about['failed']} failed runs"
+    drawn = counted(about["instances"], "instance")
+    runs = f"{drawn} of seed {seed}, {counted(about['failed'], 'failed run')}"
     terminal.note(f"{runs}, {terminal.seconds:.0f} s", "dim")
     terminal.wrote(target)
     if site:

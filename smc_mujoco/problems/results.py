@@ -240,9 +240,11 @@ class Results:
         rows = []
         for question, board in self.boards().items():
             (standing,) = [standing for standing in board.standings if standing.entry == entry]
-            place = Cell(f"{standing.place} of {len(board.standings)}", strong=standing.best)
+            others = len(board.standings) - 1
+            place = Cell(f"{standing.place} of {others + 1}", strong=standing.best and others > 0)
             rows.append([TITLES[question], place, f"{100 * standing.reached:.0f}"])
-        return Tabular(headings=("question", "place", "targets (%)"), rows=rows)
+        notes = ["* no other entry is better."] if any(row[1].strong for row in rows) else ()
+        return Tabular(headings=("question", "place", "targets (%)"), rows=rows, notes=notes)
 
     def _standings(self, question: str) -> list[Standing]:
         """Return the places of the entries on a board, the best first."""

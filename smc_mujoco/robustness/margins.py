@@ -123,6 +123,7 @@ class Margins(Answer, list[Margin]):
         """The answer: a table for each plant, and the law that tolerates the most of each kind."""
         tables = []
         places_of: dict[str, list[Fact]] = {}
+        undecided: list[str] = []  # kinds of which no law tolerates the most on some plant
         kinds = dict.fromkeys(margin.kind for margin in self)
         for plant in dict.fromkeys(margin.plant for margin in self):
             cells: dict[str, list[Cell | str]] = {}
@@ -139,7 +140,7 @@ class Margins(Answer, list[Margin]):
                     cell = Cell(margin.over_sets or margin.text, strong=margin.law == most)
                     cells.setdefault(margin.law, [margin.law]).append(cell)
             tables.append(Tabular(headings=headings, rows=list(cells.values()), title=plant))
-            won.pop("", None)
+            undecided += won.pop("", [])
             for law, of_law in won.items():
                 places_of.setdefault(law, []).append(Fact("on plant", kinds=of_law, plant=plant))
         failing = dict.fromkeys(margin.law for margin in self if math.isnan(margin.value))
@@ -151,6 +152,8 @@ class Margins(Answer, list[Margin]):
             step = NextStep(again({}, without=("--quick",)), "finds them more exactly")
         notes = [Fact("most")] * bool(places_of) + [Fact("gains are", gains=capital(self.gains))]
         facts = [Fact("tolerates", law=law, places=places) for law, places in places_of.items()]
+        of_several = undecided if len({margin.law for margin in self}) > 1 else []
+        facts.append(Fact("no most", kinds=list(dict.fromkeys(of_several))))
         facts.append(Fact("fails", laws=list(failing)))
         ranges = any(margin.over_sets for margin in self)
         return Screen(

@@ -41,22 +41,15 @@ class Boards(Answer, list[Board]):
 
     # sentences: what u is where it is a set-point, for each law with failed runs, and where no run
     # touches
-    commands: Sequence[str] = ()
-    failures: Sequence[str] = ()
-    untouched: Sequence[str] = ()
+    remarks: Sequence[str] = ()
     # why metrics have no board, shown if none has
     absent: Sequence[str] = ()
     labels: Mapping[str, str] = {}  # law -> what LaTeX calls it
     plants: Mapping[str, Plant] = {}  # by name
 
     @property
-    def remarks(self) -> list[str]:
-        """These sentences."""
-        return [*self.commands, *self.failures, *self.untouched]
-
-    @property
     def bewares(self) -> list[Fact]:
-        """The same as facts of an answer."""
+        """The remarks as facts of an answer."""
         return [Fact("beware", text=sentence) for sentence in self.remarks]
 
     @property

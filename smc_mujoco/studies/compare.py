@@ -18,7 +18,7 @@ from smc_mujoco.analysis.relevant import RELEVANT
 from smc_mujoco.analysis.tuning.effort import Search
 from smc_mujoco.analysis.tuning.objective import BUDGET, SEARCHES, Budget, Searches
 from smc_mujoco.answers.answer import Answer
-from smc_mujoco.answers.command import again
+from smc_mujoco.answers.command import again, typed
 from smc_mujoco.answers.facts import Barred, Contest, Fact, NextStep, Open, Screen
 from smc_mujoco.common import html
 from smc_mujoco.common.aliases import AnyPath, Fields, Names
@@ -159,11 +159,14 @@ class Compared(Answer):
         of_runs = all(fact.unit == "runs" for fact in facts if isinstance(fact, Open))
         more_runs = {"--seeds": f"{needed}"} if of_runs else _sets(needed)
         barred = any(isinstance(fact, Barred) and fact.defaults for fact in facts)
+        winning = {"--allow-defaults": ""}, "lets a law win over default gains"
+        if typed("--gains") == "default":
+            winning = {"--gains": None}, "searches gains, so that a law may win"
         undecided = any(contest.use and contest.use.values["rivals"] for contest in self._contests)
         steps = [
             (not facts, {"--law": ",".join(laws | dict.fromkeys(RIVALS))}, "adds rivals"),
+            (barred, *winning),
             (needed, more_runs, "makes enough runs to decide what is open"),
-            (barred, {"--allow-defaults": ""}, "lets a law win over default gains"),
             (undecided, _sets(2 * max(SEARCHES, seeds)), "shows smaller leads"),
             (
                 self._together,

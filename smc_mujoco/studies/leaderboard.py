@@ -93,15 +93,17 @@ def leaderboard(
         find("metric", name, units)
     paired_runs.check_table(table)
     boards = Boards()
-    boards.failures = paired_runs.failures(table)
-    boards.untouched = paired_runs.untouched(table)
     boards.labels = paired_runs.labels(table)
     groups = []
     for group in paired_runs.groups(table, by):
         sources = paired_runs.sources(table, group.rows[group.rows >= 0])
         groups.append(SourcedGroup(group, paired_runs.scenarios(table, group), sources))
     boards.plants = {run.plant.name: run.plant for group in groups for run in group.runs}
-    boards.commands = _commands(groups)
+    boards.remarks = [
+        *_commands(groups),
+        *paired_runs.failures(table),
+        *paired_runs.untouched(table),
+    ]
     by_metric = []
     for metric in dict.fromkeys(metrics):
         by_row = paired_runs.by_row(table, metric)

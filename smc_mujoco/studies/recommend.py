@@ -31,6 +31,7 @@ from smc_mujoco.analysis.tuning.run_limits import (
     overshoot,
     swing,
 )
+from smc_mujoco.answers.facts import Settles
 from smc_mujoco.common.errors import BrokenLawError, ScenarioError
 from smc_mujoco.common.frozen import frozen
 from smc_mujoco.common.process import return_freed_memory
@@ -71,7 +72,6 @@ from smc_mujoco.studies.recommendation import (
     RELIABLE,
     AddedNoise,
     AtRest,
-    NoLaw,
     Recommendation,
     Settled,
     Tolerance,
@@ -195,9 +195,9 @@ def _work_of_tables(course: RaceCourse) -> float:
     return sum(_coarse(trial, plant, WITHOUT, condition).work for condition in trial.conditions)
 
 
-def least_share(settled: Mapping[str, tuple[int, int]]) -> float:
-    """Return the least share of a condition's runs that settle, of (settled, all) by condition."""
-    return min(count / runs for count, runs in settled.values())
+def least_share(settled: Mapping[str, Settles]) -> float:
+    """Return the least share of a condition's runs that settle."""
+    return min(runs.count / runs.total for runs in settled.values())
 
 
 def _shown(raced: Race) -> list[str]:
@@ -243,7 +243,7 @@ def _entrants(
 
 
 def in_order(
-    settled: Mapping[str, Mapping[str, tuple[int, int]]],
+    settled: Mapping[str, Mapping[str, Settles]],
     fixed: Comparison | None,
     raced: Race | None,
     shaky: Sequence[str] = (),
@@ -260,7 +260,7 @@ def in_order(
 
     def place(law: str) -> tuple[int, ...]:
         of_law = settled[law]
-        never = not any(done for done, _ in of_law.values())
+        never = not any(runs.count for runs in of_law.values())
         behind = bool(undecided) and law not in undecided
         shakes = bool(undecided) and law in shaky
         lost = broken.get(law, 0)
@@ -358,8 +358,8 @@ def _settled(table: Table) -> Settled:
     counts: Settled = {}
     columns = table.column("law").tolist(), table.column("condition").tolist()
     for law, condition, missed in zip(*columns, values(table, SETTLES).tolist(), strict=True):
-        done, runs = counts.setdefault(law, {}).get(condition, (0, 0))
-        counts[law][condition] = done + (not missed), runs + 1
+        so_far = counts.setdefault(law, {}).get(condition, Settles(0, 0))
+        counts[law][condition] = Settles(so_far.count + (not missed), so_far.total + 1)
     return counts
 
 
@@ -399,7 +399,7 @@ def _quiet(case: Scenario) -> Scenario:
     return dataclasses.replace(case, noise=Noise(), disturbance=tuple(disturbance))
 
 
-def _together(course: RaceCourse, law: Component, seeds: int) -> tuple[int, int] | None:
+def _together(course: RaceCourse, law: Component, seeds: int) -> Settles | None:
     """Return in how many runs a law settles under all conditions asked for at once, and how many
     there are; None for a single condition, for some that exclude each other, or without time.
     """
@@ -419,7 +419,9 @@ def _together(course: RaceCourse, law: Component, seeds: int) -> tuple[int, int]
     return _settled(table)[law.name][combined.name]
 
 
-def _weighed(course: RaceCourse, law: Component) -> tuple[dict[str, float], NoLaw | None]:
+def _weighed(
+    course: RaceCourse, law: Component
+) -> tuple[dict[str, float], dict[str, Settles] | None]:
     """Return condition -> its share in J of a law, and how no law does on the same instances; {}
     and None without time.
     """
@@ -435,10 +437,8 @@ def _weighed(course: RaceCourse, law: Component) -> tuple[dict[str, float], NoLa
         _, settled_without = weighed(plant, none, goal, instances, trial.threads)
     total = costs.sum(axis=0)
     parts = (total / total.sum()).tolist()
-    return dict(zip(names, parts, strict=True)), NoLaw(
-        runs=len(instances),
-        settled=dict(zip(names, settled_without.sum(axis=0).tolist(), strict=True)),
-    )
+    settled = [Settles(done, count) for done in settled_without.sum(axis=0).tolist()]
+    return dict(zip(names, parts, strict=True)), dict(zip(names, settled, strict=True))
 
 
 def _judged(trial: Trial, goal: Objective, asked: bool) -> dict[str, bool]:

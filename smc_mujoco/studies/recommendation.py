@@ -3,7 +3,7 @@
 import dataclasses
 import math
 import shlex
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -17,6 +17,7 @@ from smc_mujoco.analysis.tuning.run_limits import CALM, LIMIT_COST, OVERSHOOT, R
 from smc_mujoco.answers.answer import Answer
 from smc_mujoco.answers.command import PROGRAM, again, instead, typed
 from smc_mujoco.answers.facts import Fact, Lead, Level, NextStep, Screen, Settles, Span
+from smc_mujoco.answers.templates import as_text
 from smc_mujoco.common import html
 from smc_mujoco.common.cached import cached_property
 from smc_mujoco.common.tabular import Cell, Tabular
@@ -44,19 +45,7 @@ MORE_MINUTES = 30  # of a next step, where the time that is needed is not known
 HARDER = ("sine", "step", "pulse")  # conditions in which more is asked of a law
 LATER = 1.2  # times an estimate: a time that it is likely to keep
 NOWHERE = Span(math.nan, math.nan)
-Settled = dict[str, dict[str, tuple[int, int]]]  # law -> condition -> runs that settle, and all
-
-
-class NoLaw(NamedTuple):
-    """How a plant does without a law, u = 0, on unseen runs of all conditions."""
-
-    runs: int  # in each condition
-    settled: Mapping[str, int]  # condition -> the number of its runs that settle
-
-    @property
-    def needless(self) -> list[str]:
-        """The conditions in which every run settles without a law."""
-        return [name for name, count in self.settled.items() if count == self.runs]
+Settled = dict[str, dict[str, Settles]]  # law -> condition -> its runs
 
 
 class AtRest(NamedTuple):
@@ -114,9 +103,10 @@ class Recommendation(Answer):
     settled: Settled
     # in how many runs the first law settles under all conditions asked for at once, and how many
     # there are; None for one condition, or for some that exclude each other
-    together: tuple[int, int] | None
+    together: Settles | None
     weighs: Mapping[str, float]  # condition -> its share of J of the first law
-    no_law: NoLaw | None  # beside the first law
+    # condition -> how many unseen runs settle under u = 0; None beside none
+    no_law: Mapping[str, Settles] | None
     rests: Mapping[str, AtRest | None]  # of each of the laws
     limits: Sequence[RunLimit]  # that searches kept
     noises: Sequence[AddedNoise]
@@ -217,8 +207,7 @@ class Recommendation(Answer):
     @property
     def runs(self) -> Settles:
         """In how many of its runs the law settles."""
-        counts = self.settled[self.law.name].values()
-        return Settles(sum(done for done, _ in counts), sum(total for _, total in counts))
+        return _summed(self.settled[self.law.name].values())
 
     @property
     def settling_times(self) -> Span:
@@ -234,7 +223,7 @@ class Recommendation(Answer):
         """The conditions in which no law settles in any run."""
         never = []
         for name in self.settled[self.law.name]:
-            if not any(of_law[name][0] for of_law in self.settled.values()):
+            if not any(of_law[name].count for of_law in self.settled.values()):
                 never.append(name)
         return never
 
@@ -249,11 +238,8 @@ class Recommendation(Answer):
     @property
     def unsettled_in(self) -> dict[str, Settles]:
         """Condition -> how many runs of the law settle, where it does not do so reliably."""
-        unsettled = {}
-        for name, (done, runs) in self.settled[self.law.name].items():
-            if done < RELIABLE * runs:
-                unsettled[name] = Settles(done, runs)
-        return unsettled
+        of_law = self.settled[self.law.name].items()
+        return {name: runs for name, runs in of_law if runs.count < RELIABLE * runs.total}
 
     @property
     def screen(self) -> Screen:
@@ -314,19 +300,19 @@ class Recommendation(Answer):
             laws = 1 + len([law for law in self.rivals if law != WITHOUT])
             searches = self.race.sets if searched and self.over_sets else None
             facts.append(Fact("best", laws=laws, lead=self.lead, searches=searches))
-        together = self.together and Settles(*self.together)
         times = self.settling_times
-        facts.append(Fact("settles", runs=self.runs, times=times, together=together))
+        facts.append(Fact("settles", runs=self.runs, times=times, together=self.together))
         margins = [margin for margin in self.margins if not math.isnan(margin.value)]
         levels = [Level(margin.kind, margin.value, margin.unit, margin.open) for margin in margins]
         if levels or self.tolerance.untried:
             facts.append(Fact("withstands", levels=levels, untried=self.tolerance.untried))
         if none and form != "unneeded":
-            done = Settles(sum(none.settled.values()), none.runs * len(none.settled))
             over = NOWHERE
             if self.law.name != WITHOUT and self.fixed and self.law.name in self.fixed.laws:
                 over = _lead(self.fixed, self.law.name, WITHOUT).share
-            facts.append(Fact("without", runs=done, below=over if over.low > 0.0 else None))
+            facts.append(
+                Fact("without", runs=_summed(none.values()), below=over if over.low > 0.0 else None)
+            )
         return facts
 
     @property
@@ -339,7 +325,9 @@ class Recommendation(Answer):
         apart = "+".join(self.settled[self.law.name]) if self.apart else ""
         lost = lost_runs(self.fixed).get(self.law.name)
         broken = Settles(lost, len(self.fixed.cells[0, 0])) if lost and self.fixed else None
-        without = self.no_law.needless if self.no_law and self.form != "unneeded" else []
+        without = []
+        if self.no_law and self.form != "unneeded":
+            without = [name for name, runs in self.no_law.items() if runs.count == runs.total]
         if self.form == "untried":
             laws = ()
         elif len(laws) > MOST_NAMED:
@@ -348,7 +336,7 @@ class Recommendation(Answer):
             *(Fact("rare", where=name, runs=runs) for name, runs in rare.items()),
             Fact("never", where=[name for name in never if name not in in_first_line]),
             Fact("leans", where=str(self.worst_run.condition) if leaning else ""),
-            Fact("together", where=apart, runs=Settles(*self.together or (0, 0))),
+            Fact("together", where=apart, runs=self.together),
             Fact("unreliable", law=self._lower_J),
             *self._of_rest,
             *self._of_margins,
@@ -366,7 +354,7 @@ class Recommendation(Answer):
         """
         if self.together is None or self.never_settled:
             return False
-        return self.together[0] < RELIABLE * self.together[1]
+        return self.together.count < RELIABLE * self.together.total
 
     @property
     def _lower_J(self) -> str:
@@ -489,7 +477,7 @@ class Recommendation(Answer):
         what the law withstands.
         """
         tables = [self._table_of_laws, self._table_of_verdicts]
-        runs = next(iter(self.settled[self.law.name].values()))[1]
+        runs = next(iter(self.settled[self.law.name].values())).total
         groups = dict.fromkeys(" under ".join(board.group.values()) for board in self.leaderboard)
         for about, table in zip(groups, self.leaderboard.tables, strict=False):
             rows = [list(map(_unmarked, row)) for row in table.rows]
@@ -557,12 +545,9 @@ class Recommendation(Answer):
         noises = {noise.condition: noise for noise in self.noises}
         rows = []
         for name in dict.fromkeys([*self.settled[self.law.name], *self.weighs]):
-            runs = [self.settled[law.name].get(name) for law in self.laws]
-            settled = [f"{count[0]} of {count[1]}" if count else "" for count in runs]
+            settled = [_counted(self.settled[law.name].get(name)) for law in self.laws]
             share = f"{100 * self.weighs[name]:.0f} %" if name in self.weighs else ""
-            without = ""
-            if self.no_law and name in self.no_law.settled:
-                without = f"{self.no_law.settled[name]} of {self.no_law.runs}"
+            without = _counted((self.no_law or {}).get(name))
             period = velocity = size = added = ""
             if case := cases.get(name):
                 period, velocity = f"{1e3 * case.control_period:g}", str(case.resolved.velocity)
@@ -572,7 +557,7 @@ class Recommendation(Answer):
             rows.append((f"{name}{added}", *settled, share, without, period, velocity, size))
         if self.together:
             blank = [""] * (len(self.laws) + 4)
-            rows.append(("all at once", f"{self.together[0]} of {self.together[1]}", *blank))
+            rows.append(("all at once", _counted(self.together), *blank))
         headings = ["condition", *(f"settles ({law.name})" for law in self.laws)]
         headings += ["share of J", "without a law", "u changes every (ms)", "velocity"]
         headings.append("noise (standard deviations)")
@@ -647,6 +632,17 @@ def lost_runs(comparison: Comparison | None) -> dict[str, int]:
     if comparison is None:
         return {}
     return dict(zip(comparison.laws, comparison.away[:, 0].sum(axis=1).tolist(), strict=True))
+
+
+def _summed(runs: Iterable[Settles]) -> Settles:
+    """Return the runs of all conditions."""
+    counts, totals = zip(*runs, strict=True)
+    return Settles(sum(counts), sum(totals))
+
+
+def _counted(runs: Settles | None) -> str:
+    """Return a cell with a count of runs, such as "3 of 24"; "" where there are none."""
+    return as_text(runs) if runs else ""
 
 
 def _cost(J: float) -> str:

@@ -38,7 +38,7 @@ from smc_mujoco.studies import which as module
 from smc_mujoco.studies.answer_time import FEWEST_SEEDS, AnswerTime
 from smc_mujoco.studies.fair_gains import Candidate, Trial
 from smc_mujoco.studies.race import RaceCourse
-from smc_mujoco.studies.recommendation import AtRest, NoLaw
+from smc_mujoco.studies.recommendation import AtRest
 
 FAST = smc.law("observer_free", lam=6.0, k1=2.0)
 
@@ -188,8 +188,8 @@ def test_the_evidence_has_the_numbers_of_the_race_and_of_the_runs(raced):
     shares = [float(row[share].rstrip(" %")) for row in conditions.rows if row[share]]
     assert sum(shares) == pytest.approx(100.0, abs=1.5)
     first, *_ = recommendation.laws
-    (done, runs) = recommendation.settled[first.name]["coulomb"]
-    assert conditions.rows[0][:2] == ("coulomb", f"{done} of {runs}")
+    settled = recommendation.settled[first.name]["coulomb"]
+    assert conditions.rows[0][:2] == ("coulomb", f"{settled.count} of {settled.total}")
     swing = by_title["Laws"].headings.index("swing of u")
     assert {name for name, row in J.items() if row[swing]} == {
         law.name for law in recommendation.laws
@@ -218,7 +218,7 @@ def test_no_law_is_the_answer_where_it_has_the_lowest_J(tmp_path):
     assert recommended.lead.rival == bad.name
     assert recommended.lines[0].startswith("No law")
     assert "conditions='sine'" in recommended.next_step.command  # not other laws
-    half = dataclasses.replace(recommended, settled={race.WITHOUT: {"nominal": (1, 2)}})
+    half = dataclasses.replace(recommended, settled={race.WITHOUT: {"nominal": Settles(1, 2)}})
     assert "needed" not in half.lines[0]
     assert "is better than u = 0, which settles 1 of 2 runs" in half.lines[0]
     assert numbers(recommended.lines[0])[1:3] == [3, 3]
@@ -249,7 +249,7 @@ def test_each_form_has_its_first_line(raced):
     assert form == "undecided"
     laws = len(raced_laws.laws)
     assert f"{laws} of {laws + 2} laws" in said
-    never = {law: {"coulomb": (0, 4)} for law in recommendation.settled}
+    never = {law: {"coulomb": Settles(0, 4)} for law in recommendation.settled}
     form, said = first(settled=never)
     assert form == "unsettled"
     assert "coulomb" in said
@@ -262,7 +262,9 @@ def test_each_form_has_its_first_line(raced):
     assert "overshoot < 2 % so far" in said
     assert name in said
     assert first(race=lost)[0] != "unkept"
-    partly = {law: {"coulomb": (4, 4), "noise": (0, 4)} for law in recommendation.settled}
+    partly = {
+        law: {"coulomb": Settles(4, 4), "noise": Settles(0, 4)} for law in recommendation.settled
+    }
     form, said = first(settled=partly, judged={"coulomb": True, "noise": True})
     assert form == "unsettled"
     assert "noise" in said
@@ -274,7 +276,7 @@ def test_each_form_has_its_first_line(raced):
     assert open_race.form == "undecided"
     (never,) = said_of(open_race, "never")
     assert never.values["where"] == ["noise"]
-    partly[name] = {"coulomb": (4, 4), "noise": (1, 4)}
+    partly[name] = {"coulomb": Settles(4, 4), "noise": Settles(1, 4)}
     assert first(settled=partly)[0] == "law"
     none = {race.WITHOUT: raced_laws.entrants[name]}
     form, said = first(race=raced_laws._replace(entrants=none, unsearched=["pid"]))
@@ -296,8 +298,8 @@ def test_one_next_step_is_a_whole_command(raced, tmp_path, monkeypatch):
         "smc-mujoco which m.xml:slide --condition a --condition b --law pid,adrc"
     )
     assert numbers(more)[-1] >= 9
-    coupled = {recommendation.law.name: {"a": (4, 4), "b": (4, 4)}}
-    apart = dataclasses.replace(recommendation, settled=coupled, together=(0, 4))
+    coupled = {recommendation.law.name: {"a": Settles(4, 4), "b": Settles(4, 4)}}
+    apart = dataclasses.replace(recommendation, settled=coupled, together=Settles(0, 4))
     together = apart.next_step.command
     assert together.count("--condition") == 1
     assert "--condition a+b" in together
@@ -333,7 +335,7 @@ def test_cautions_are_lines_with_their_numbers(raced):
     limit = SimpleNamespace(what="overshoot", most=10.0)
     limited = dataclasses.replace(rested, limits=[limit])
     assert numbers(line(limited, "overshoot"))[:2] == [19.0, 10.0]
-    rare = dataclasses.replace(recommendation, settled={name: {"coulomb": (2, 4)}})
+    rare = dataclasses.replace(recommendation, settled={name: {"coulomb": Settles(2, 4)}})
     assert Settles(2, 4) in [fact.values["runs"] for fact in said_of(rare, "rare")]
     delay = recommendation.margins[0]
     tight = dataclasses.replace(delay, value=0.01, resolution=0.005)
@@ -356,7 +358,7 @@ def test_cautions_are_lines_with_their_numbers(raced):
     helped = recommendation.tolerance._replace(helped=["z"], opposed=recommendation.margins[1])
     fights = dataclasses.replace(recommendation, tolerance=helped)._of_margins[-1]
     assert (fights.kind, fights.values["value"]) == ("helped", recommendation.margins[1].value)
-    needless = NoLaw(4, {"coulomb": 4, "noise": 1})
+    needless = {"coulomb": Settles(4, 4), "noise": Settles(1, 4)}
     unneeded = dataclasses.replace(recommendation, no_law=needless)
     assert "coulomb" in line(unneeded, "without  ")
 
@@ -608,8 +610,8 @@ class Columns:
 
 def test_the_worst_run_is_of_the_condition_in_which_the_law_settles_least_and_then_latest():
     assert recommend._settled(Columns()) == {
-        "a": {"nominal": (2, 2), "noise": (1, 2)},
-        "b": {"nominal": (0, 2), "noise": (2, 2)},
+        "a": {"nominal": Settles(2, 2), "noise": Settles(1, 2)},
+        "b": {"nominal": Settles(0, 2), "noise": Settles(2, 2)},
     }
     assert recommend._worst_run(Columns(), "a") == 2
     assert recommend._worst_run(Columns(), "b") == 4
@@ -659,5 +661,5 @@ def test_a_law_that_overshoots_more_than_was_asked_for_comes_last():
     broken = recommend.breaking((RunLimit("overshoot", 2.0),), None, rests)
     assert broken == {"wild": 1}
     assert recommend.breaking((), None, rests) == {}
-    settled = {law: {"nominal": (4, 4)} for law in rests}
+    settled = {law: {"nominal": Settles(4, 4)} for law in rests}
     assert recommend.in_order(settled, None, None, broken=broken) == ["calm", "unseen", "wild"]
