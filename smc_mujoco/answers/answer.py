@@ -12,7 +12,7 @@ from smc_mujoco.answers.explain import explain
 from smc_mujoco.answers.facts import Screen
 from smc_mujoco.common import html
 from smc_mujoco.common.aliases import AnyPath, Names
-from smc_mujoco.common.files import replacing
+from smc_mujoco.common.files import write_text
 from smc_mujoco.common.tabular import Tables, Tabular
 
 if TYPE_CHECKING:
@@ -105,7 +105,4 @@ class Answer(Tables):
             rows = [explain(word).split("\n", 1) for word in self.words]
             words = Tabular(headings=("word", "meaning"), rows=rows, name_columns=2)
             parts.append(words.as_html())
-        page = html.page(self.title, parts)
-        with replacing(Path(path)) as file:
-            file.write_text(page, encoding="utf-8")
-        return Path(path)
+        return write_text(Path(path), html.page(self.title, parts))

@@ -36,16 +36,6 @@ class Settles:
 
 
 @frozen_data
-class Level:
-    """A level that a law withstands."""
-
-    kind: str  # a kind of margins
-    value: float
-    unit: str
-    open: bool  # whether the search ended there
-
-
-@frozen_data
 class NextStep:
     """What to do next: a whole command to paste, and what it is for."""
 

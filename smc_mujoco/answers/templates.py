@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from smc_mujoco.answers.command import PROGRAM
-from smc_mujoco.answers.facts import Fact, Lead, Level, Settles, Span
+from smc_mujoco.answers.facts import Fact, Lead, Settles, Span
 from smc_mujoco.common.text import counted, joined, number
 
 FIELD = re.compile(r"\{(\w+):?([^}]*)\}")
@@ -23,12 +23,9 @@ LARGEST = 0.995  # a share that is printed: of the leads that might not show; ch
 PART = "[ ({raced} of {named} laws tried)]"
 IN_FILE = "[ for u in {unit}][   {file}]"
 BEYOND = "a value beyond may do better"
-LEVELS = {"disturbance": "force"}  # a kind of margin, as `which` says it
 # a kind of fact -> the label of its line, and the text
 TEXTS = {
     # of several commands
-    "beware": ("beware", "{text}"),
-    "doubt": ("doubt", "{text}"),
     "further": ("further", "{count:line} in the report and by --full"),
     "names": ("{label}", "{names:,}"),
     "sentence": ("{label}", "{text}"),
@@ -126,6 +123,7 @@ TEXTS = {
         "withstands",
         "[{levels:,}; no time for {untried}|{levels:,}|no time for {untried}]",
     ),
+    "level": ("", "{kind} [x {open}{factor}|{open}{time:ms}|{open}{value} {unit}]"),
     "without": ("without a law", "{runs} runs settle[; the law's J is {below:%} below]"),
     # which: what to know before use
     "rare": ("beware", "{runs} runs settle under {where}"),
@@ -216,7 +214,6 @@ TEXTS = {
         "bounds",
     ),
     "fail anywhere": ("fail", "{fails}no bounds on one or two axes tell where"),
-    "checked": ("", "{text}"),
     # identify
     "fits": (
         "",
@@ -244,7 +241,6 @@ TEXTS = {
     "listed": ("more", f"{PROGRAM} list laws has a line about each, list NAME a page"),
 }
 BELOW = "[below {rival}'s, which fails or breaks a limit in {gaps} runs|{share:%} below {rival}]"
-LEVEL = "{kind} [x {open}{factor}|{open}{time:ms}|{open}{value} {unit}]"
 
 
 def said(fact: Fact) -> tuple[str, str]:
@@ -325,19 +321,10 @@ def _lead(lead: Lead) -> str:
     return filled(BELOW, {**vars(lead), "share": lead.share})
 
 
-def _level(level: Level) -> str:
-    """Return a level that is withstood, such as "mass x 1.6"."""
-    kind = LEVELS.get(level.kind, level.kind)
-    open_ = "≥ " if level.open else True
-    in_unit = {"1": "factor", "s": "time"}.get(level.unit, "value")
-    return filled(LEVEL, {"kind": kind, "open": open_, in_unit: level.value, "unit": level.unit})
-
-
 WRITERS: dict[type, Callable[[Any], str]] = {
     str: str,
     bool: lambda flag: "",
     Fact: lambda fact: said(fact)[1],
     Settles: lambda runs: f"{runs.count} of {runs.total}",
     Lead: _lead,
-    Level: _level,
 }

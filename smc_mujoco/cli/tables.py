@@ -8,7 +8,7 @@ import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
 from itertools import chain
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 from rich.padding import Padding
@@ -29,9 +29,6 @@ from smc_mujoco.metrics.conventions import CATALOGUE, ChannelGroup, groups
 from smc_mujoco.metrics.tip import tip_scores
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
-
-if TYPE_CHECKING:
-    pass
 
 T = TypeVar("T")
 # label -> the same run again, as `step_halving.repetitions` has it

@@ -257,9 +257,7 @@ def from_json(text: str) -> Any:
 def write_json(path: Path, data: Any, indent: int | None = 1) -> Path:
     """Write data as a JSON file, atomically."""
     text = to_json(data, indent)
-    with replacing(path) as file:
-        file.write_text(f"{text}\n", encoding="utf-8")
-    return path
+    return write_text(path, f"{text}\n")
 
 
 def read_json(path: Path) -> Any:
@@ -287,6 +285,13 @@ def _seal(data: Mapping[str, Any]) -> str:
 def _part(path: Path) -> Path:
     """Return the name of a new file beside `path`."""
     return path.with_name(f".{path.stem}.{uuid.uuid4().hex}{path.suffix}")
+
+
+def write_text(path: Path, text: str) -> Path:
+    """Write a text, all of it or nothing. Return the path."""
+    with replacing(path) as file:
+        file.write_text(text, encoding="utf-8")
+    return path
 
 
 @contextlib.contextmanager

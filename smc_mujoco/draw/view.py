@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 from smc_mujoco.common import extras, html
 from smc_mujoco.common.aliases import AnyPath, Array
 from smc_mujoco.common.errors import ScenarioError, shown
-from smc_mujoco.common.files import replacing, with_ending
+from smc_mujoco.common.files import with_ending, write_text
 from smc_mujoco.control.law import Law
 from smc_mujoco.draw import wording
 from smc_mujoco.draw.session import Session, law_for, laws_of
@@ -208,8 +208,7 @@ class LiveView:
             self.session.advance(1.0 / FPS)
             recording.insert_sleep(self.session.time - before)
             self.machines.show()
-        with replacing(path) as part:
-            part.write_text(with_less_work(recording.as_html()), encoding="utf-8")
+        write_text(path, with_less_work(recording.as_html()))
 
 
 def runs_of(

@@ -192,12 +192,11 @@ def _law_and_file(what: list[str], packed: bool) -> tuple[str, Path]:
 
 def _write_c(out: Path, law: "Law", numbers: str, joints: int | None) -> None:
     """Write a law as C."""
-    from smc_mujoco.common.files import replacing
+    from smc_mujoco.common.files import write_text
     from smc_mujoco.exchange.c.export_c import law_to_c
 
     text = law_to_c(law, numbers, joints)
-    with replacing(out) as part:
-        part.write_text(text, "utf-8")
+    write_text(out, text)
 
 
 # heading in the help -> commands

@@ -234,7 +234,7 @@ class Identified(Answer):
         doubts = []
         for note in self.notes:
             if not note.startswith(self.lacks[1:]):  # further lacks of fit are in the tables
-                doubts.append(Fact("doubt", text=note))
+                doubts.append(Fact("sentence", label="doubt", text=note))
         return Screen(
             tables=[Tabular(headings=("",) * 4, rows=rows)],
             notes=[Fact("fits", **fits)],

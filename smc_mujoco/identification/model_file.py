@@ -10,7 +10,7 @@ import mujoco
 import numpy as np
 
 from smc_mujoco.common.errors import ScenarioError, ScenarioWarning, users_stacklevel
-from smc_mujoco.common.files import replacing
+from smc_mujoco.common.files import write_text
 from smc_mujoco.common.mjcb import compiled
 from smc_mujoco.common.text import joined
 from smc_mujoco.identification.log_rig import LogRig
@@ -55,9 +55,7 @@ def save_model(rig: LogRig, path: Path) -> Path:
             ScenarioWarning,
             stacklevel=users_stacklevel(),
         )
-    with replacing(path) as file:
-        file.write_text(text, encoding="utf-8")
-    return path
+    return write_text(path, text)
 
 
 def _mjcf(rig: LogRig, source: Any, path: Path, left_out: list[str]) -> str:

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from smc_mujoco.common.aliases import Numbers
-from smc_mujoco.common.files import replacing
+from smc_mujoco.common.files import write_text
 from smc_mujoco.common.tabular import Tabular
 from smc_mujoco.simulation.conditions import Condition
 
@@ -33,7 +33,5 @@ def table(values: Numbers, errors: Numbers, units: Mapping[str, str]) -> list[st
 
 def save_condition(file: Path, text: str, condition: Condition) -> Path:
     """Write a condition with what was found as comments above it. Return the path."""
-    with replacing(file) as part:
-        comments = "".join(f"# {line}\n" for line in text.splitlines())
-        part.write_text(f"{comments}{condition}\n", encoding="utf-8")
-    return file
+    comments = "".join(f"# {line}\n" for line in text.splitlines())
+    return write_text(file, f"{comments}{condition}\n")

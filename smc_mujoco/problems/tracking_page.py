@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from smc_mujoco.common.files import replacing
+from smc_mujoco.common.files import write_text
 from smc_mujoco.common.text import capital, joined, number
 from smc_mujoco.control.component import bounded, gains_text
 from smc_mujoco.problems.tracking import tracking_suites
@@ -209,9 +209,7 @@ def write(board: TrackingBoard, path: Path) -> Path:
     """Write the page and its picture beside it. Return the page."""
     picture = path.with_suffix(".svg")
     draw(board, picture)
-    with replacing(path) as file:
-        file.write_text(page(board, picture.name), encoding="utf-8")
-    return path
+    return write_text(path, page(board, picture.name))
 
 
 def main(arguments: Sequence[str]) -> None:

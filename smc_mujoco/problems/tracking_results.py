@@ -28,7 +28,7 @@ from smc_mujoco.common.cache import CachedResult
 from smc_mujoco.common.constraints import Progress, constrained
 from smc_mujoco.common.data import keyword_dataclass
 from smc_mujoco.common.errors import ScenarioError
-from smc_mujoco.common.files import read_json, reading, replacing, slug, write_json
+from smc_mujoco.common.files import read_json, reading, slug, write_json, write_text
 from smc_mujoco.common.progress import bar
 from smc_mujoco.common.tabular import Cell, Tabular
 from smc_mujoco.common.text import number
@@ -115,8 +115,7 @@ def enter_tracking(
         "versions": versions(),
         "problems": searched,
     }
-    with replacing(target) as file:
-        file.write_text(_compact(about), encoding="utf-8")
+    write_text(target, _compact(about))
     for part in parts.iterdir():
         part.unlink()
     parts.rmdir()

@@ -50,7 +50,7 @@ class Boards(Answer, list[Board]):
     @property
     def bewares(self) -> list[Fact]:
         """The remarks as facts of an answer."""
-        return [Fact("beware", text=sentence) for sentence in self.remarks]
+        return [Fact("sentence", label="beware", text=remark) for remark in self.remarks]
 
     @property
     def winners(self) -> list[tuple[str, str, str, str]]:

@@ -34,7 +34,7 @@ from smc_mujoco.common.constraints import (
 )
 from smc_mujoco.common.errors import MAX_ITEMS, ScenarioError, find, items_of, shown, warn_once
 from smc_mujoco.common.extras import package
-from smc_mujoco.common.files import replacing
+from smc_mujoco.common.files import write_text
 from smc_mujoco.common.tabular import Tabular, commented, plain
 from smc_mujoco.common.text import counted, joined, number, span
 from smc_mujoco.control import gain_sets, source
@@ -361,8 +361,7 @@ class Compared(Answer):
             comments.append(f"{commented(plain(table))}\n")
         text = "\n".join([*comments, *(table.to_latex() for table in self._without_times)])
         if path is not None:
-            with replacing(Path(path)) as file:
-                file.write_text(text, encoding="utf-8")
+            write_text(Path(path), text)
         return text
 
     @property

@@ -16,7 +16,7 @@ from smc_mujoco.analysis.tuning.result import Tuned
 from smc_mujoco.analysis.tuning.run_limits import CALM, LIMIT_COST, OVERSHOOT, RunLimit
 from smc_mujoco.answers.answer import Answer
 from smc_mujoco.answers.command import PROGRAM, again, instead, typed
-from smc_mujoco.answers.facts import Fact, Lead, Level, NextStep, Screen, Settles, Span
+from smc_mujoco.answers.facts import Fact, Lead, NextStep, Screen, Settles, Span
 from smc_mujoco.answers.templates import as_text
 from smc_mujoco.common import html
 from smc_mujoco.common.cached import cached_property
@@ -44,6 +44,7 @@ MOST_NAMED = 5  # laws that a line names
 MORE_MINUTES = 30  # of a next step, where the time that is needed is not known
 HARDER = ("sine", "step", "pulse")  # conditions in which more is asked of a law
 LATER = 1.2  # times an estimate: a time that it is likely to keep
+LEVELS = {"disturbance": "force"}  # a kind of margin -> as the answer says it
 NOWHERE = Span(math.nan, math.nan)
 Settled = dict[str, dict[str, Settles]]  # law -> condition -> its runs
 
@@ -303,7 +304,7 @@ class Recommendation(Answer):
         times = self.settling_times
         facts.append(Fact("settles", runs=self.runs, times=times, together=self.together))
         margins = [margin for margin in self.margins if not math.isnan(margin.value)]
-        levels = [Level(margin.kind, margin.value, margin.unit, margin.open) for margin in margins]
+        levels = list(map(_level, margins))
         if levels or self.tolerance.untried:
             facts.append(Fact("withstands", levels=levels, untried=self.tolerance.untried))
         if none and form != "unneeded":
@@ -634,10 +635,17 @@ def lost_runs(comparison: Comparison | None) -> dict[str, int]:
     return dict(zip(comparison.laws, comparison.away[:, 0].sum(axis=1).tolist(), strict=True))
 
 
+def _level(margin: Margin) -> Fact:
+    """Return a level that is withstood, such as "mass x 1.6"."""
+    in_unit = {"1": "factor", "s": "time"}.get(margin.unit, "value")
+    about = {"kind": LEVELS.get(margin.kind, margin.kind), "unit": margin.unit}
+    return Fact("level", **about, open="≥ " if margin.open else True, **{in_unit: margin.value})
+
+
 def _summed(runs: Iterable[Settles]) -> Settles:
     """Return the runs of all conditions."""
-    counts, totals = zip(*runs, strict=True)
-    return Settles(sum(counts), sum(totals))
+    of_all = [(of_one.count, of_one.total) for of_one in runs]
+    return Settles(*np.sum(of_all, axis=0).tolist())
 
 
 def _counted(runs: Settles | None) -> str:

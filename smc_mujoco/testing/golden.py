@@ -16,7 +16,7 @@ from typing import Any
 
 from smc_mujoco.common.aliases import Fields, Numbers
 from smc_mujoco.common.errors import ScenarioError, number, shown
-from smc_mujoco.common.files import plain, read_json, replacing
+from smc_mujoco.common.files import plain, read_json, write_text
 from smc_mujoco.testing.limits import Limit, judge, quantity
 from smc_mujoco.testing.response import StepResponse
 
@@ -45,8 +45,7 @@ def record(file: Path, key: str, response: StepResponse, tolerances: Numbers) ->
         with locked(file.parent):
             entries = dict(sorted((read(file) | {key: entry}).items()))
             text = json.dumps(plain(entries), indent=2, ensure_ascii=False)
-            with replacing(file) as part:
-                part.write_text(f"{text}\n", encoding="utf-8")
+            write_text(file, f"{text}\n")
     except OSError as error:
         raise ScenarioError(
             f"{file} cannot be written ({error.strerror}): record it in a writable folder"

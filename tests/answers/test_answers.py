@@ -156,7 +156,7 @@ def test_a_page_leaves_the_breaking_of_lines_to_the_browser(tmp_path, monkeypatc
     screen = Screen(
         heading=Fact("law on plant", law="a", plant="b"),
         tables=[Tabular(headings=["", "J (s²)"], rows=[["adrc", "0.2"]])],
-        facts=[Fact("doubt", text=40 * "a long doubt ")],
+        facts=[Fact("sentence", label="doubt", text=40 * "a long doubt ")],
         next=NextStep(command, "tries all"),
     )
     monkeypatch.setattr(Sample, "screen", screen)

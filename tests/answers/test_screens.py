@@ -176,7 +176,7 @@ def test_a_fact_without_a_value_that_its_text_needs_is_not_said():
 
 
 def test_facts_without_room_on_a_screen_are_counted_and_commands_stay():
-    doubts = [Fact("doubt", text=f"number {i}") for i in range(30)]
+    doubts = [Fact("sentence", label="doubt", text=f"number {i}") for i in range(30)]
     lines = answers.screen_lines(Screen(facts=doubts, next=NextStep("smc-mujoco list", "lists")))
     assert len(lines) <= answers.LINES - answers.BELOW
     count = sum(line.startswith("doubt") for line in lines)

@@ -13,7 +13,7 @@ from typing import Annotated, Any
 from smc_mujoco.common.aliases import AnyPath
 from smc_mujoco.common.constraints import OneOf, Positive, constrained
 from smc_mujoco.common.errors import ScenarioError
-from smc_mujoco.common.files import replacing
+from smc_mujoco.common.files import write_text
 from smc_mujoco.common.text import joined
 from smc_mujoco.control.component import Template
 from smc_mujoco.control.estimator import Estimator
@@ -125,8 +125,7 @@ def law_to_package(
     for name, text in _files(exported, package, kind, law).items():
         target = out / name
         target.parent.mkdir(parents=True, exist_ok=True)
-        with replacing(target) as part:
-            part.write_text(text, encoding="utf-8")
+        write_text(target, text)
     return out
 
 
