@@ -123,7 +123,7 @@ TEXTS = {
         "withstands",
         "[{levels:,}; no time for {untried}|{levels:,}|no time for {untried}]",
     ),
-    "level": ("", "{kind} [x {open}{factor}|{open}{time:ms}|{open}{value} {unit}]"),
+    "level": ("", "{what} [x {open}{factor}|{open}{time:ms}|{open}{value} {unit}]"),
     "without": ("without a law", "{runs} runs settle[; the law's J is {below:%} below]"),
     # which: what to know before use
     "rare": ("beware", "{runs} runs settle under {where}"),
@@ -204,14 +204,14 @@ TEXTS = {
         "{failed:%}]",
     ),
     "first": (
-        "first",
+        "explains",
         "[{axis}, {median:%} ({share:%}), alone and with others|{open}open, as intervals overlap "
         "(give more points)|no axis, as the scores do not differ, or most runs have none]",
     ),
     "fail where": (
-        "fail where",
-        "{where}: {runs} runs ({share:%}), elsewhere {outside}, of those that did not choose these "
-        "bounds",
+        "fail",
+        "where {where}: {runs} runs ({share:%}), elsewhere {outside}, of those that did not choose "
+        "these bounds",
     ),
     "fail anywhere": ("fail", "{fails}no bounds on one or two axes tell where"),
     # identify

@@ -119,7 +119,7 @@ def _enter_tracking(
     target = tracking_results.enter_tracking(text, suite, results, threads, True, executor)
     board = tracking_results.tracking_board(suite, results)
     entry = tracking_results.read_result(target).name
-    page = tracking_page.write(board, target.parent / "board.md")
+    page = tracking_page.write(board, target.parent / "board.md", entry)
     for line in screen_lines(board.standing(entry)):
         terminal.note(line)
     terminal.wrote(page)

@@ -240,8 +240,8 @@ class Results:
         rows = []
         for question, board in self.boards().items():
             (standing,) = [standing for standing in board.standings if standing.entry == entry]
-            others = len(board.standings) - 1
-            place = Cell(f"{standing.place} of {others + 1}", strong=standing.best and others > 0)
+            rivals = len(board.standings) - 1
+            place = Cell(f"{standing.place} of {rivals + 1}", strong=standing.best and rivals > 0)
             rows.append([TITLES[question], place, f"{100 * standing.reached:.0f}"])
         notes = ["* no other entry is better."] if any(row[1].strong for row in rows) else ()
         return Tabular(headings=("question", "place", "targets (%)"), rows=rows, notes=notes)

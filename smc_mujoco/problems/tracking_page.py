@@ -39,8 +39,10 @@ BESIDE = {
 TITLES = {"load": "Leaderboard: an unknown load", "friction": "Leaderboard: dry friction"}
 
 
-def page(board: TrackingBoard, picture: str) -> str:
-    """Return the page as Markdown; `picture` is the name of its file."""
+def page(board: TrackingBoard, picture: str, own: str = "") -> str:
+    """Return the page as Markdown; `picture` is the name of its file, and `own` an entry that every
+    table has.
+    """
     suite = board.suite
     load = suite.without
     lines = [
@@ -50,7 +52,7 @@ def page(board: TrackingBoard, picture: str) -> str:
         "",
         f"![Error of each entry over the least of its problem]({picture})",
         "",
-        f"*In colour: entries that no other leads in some problem.{_left_out(board)}*",
+        f"*In colour: entries that no other leads in some problem.{_left_out(board, own)}*",
         "",
         suite.about,
         "",
@@ -91,13 +93,13 @@ def page(board: TrackingBoard, picture: str) -> str:
         limit = f"u may vary by {problem.limit:g} bounds a second"
         why = capital(problem.why)
         lines += [f"## {problem.name}", "", f"{why}. `{problem.load}`; {limit}.", ""]
-        lines += [*problem_table(board, result), ""]
+        lines += [*problem_table(board, result, own), ""]
     return "\n".join(lines)
 
 
-def _left_out(board: TrackingBoard) -> str:
+def _left_out(board: TrackingBoard, own: str) -> str:
     """Return how many entries the picture leaves out, in words; "" if none."""
-    count = len(board.entries) - len(shown(board))
+    count = len(board.entries) - len(shown(board, own))
     return f" {count} more have larger errors." if count else ""
 
 
@@ -151,11 +153,14 @@ def page_name(board: TrackingBoard) -> str:
     return f"leaderboard_{board.suite.without}.md"
 
 
-def problem_table(board: TrackingBoard, result: ProblemBoard) -> Iterator[str]:
-    """Yield the table of a problem: the first entries, and those that no other leads."""
+def problem_table(board: TrackingBoard, result: ProblemBoard, own: str) -> Iterator[str]:
+    """Yield the table of a problem: the first entries, those that no other leads, and `own`."""
     yield "| entry, its gains | error, counts | other | without | u varies |"
     yield "|---|---|---|---|---|"
-    rows = [each for k, each in enumerate(result.standings) if k < FIRST or each.leads]
+    rows = [*result.standings[:FIRST]]
+    rows += [
+        standing for standing in result.standings[FIRST:] if standing.leads or standing.entry == own
+    ]
     for row in rows:
         star = "*" if row.leads else ""
         same = "" if row.of_load else " ="
@@ -163,7 +168,7 @@ def problem_table(board: TrackingBoard, result: ProblemBoard) -> Iterator[str]:
         without, rate = number(row.counted.without), number(row.counted.rate)
         yield (
             f"| `{row.entry}`<br><small>{gains_text(bounded(row.counted.gains))}</small> "
-            f"| {number(row.error)}{star} ({low} to {high}) | {number(row.other)} "
+            f"| {number(row.error)}{star} ({low} to {high}) | {number(row.better)} "
             f"| {without}{same} | {rate} |"
         )
     more = len(result.standings) - len(rows)
@@ -205,11 +210,11 @@ def tag_table(board: TrackingBoard) -> Iterator[str]:
         yield f"| {tag}: {value} | {len(names)} | {problems} | {number(float(typical))} |"
 
 
-def write(board: TrackingBoard, path: Path) -> Path:
-    """Write the page and its picture beside it. Return the page."""
+def write(board: TrackingBoard, path: Path, own: str = "") -> Path:
+    """Write the page and its picture beside it, both with the entry `own`. Return the page."""
     picture = path.with_suffix(".svg")
-    draw(board, picture)
-    return write_text(path, page(board, picture.name))
+    draw(board, picture, own)
+    return write_text(path, page(board, picture.name, own))
 
 
 def main(arguments: Sequence[str]) -> None:

@@ -201,7 +201,7 @@ class Standing:
 
     entry: str
     error: float  # counts, the median over instances of its worse search
-    other: float  # of its better search
+    better: float  # of its better search
     interval: Pair  # 95 %, of `error`
     counted: Found  # the worse search
     leads: bool  # whether no other entry leads it, and it has an error
@@ -243,9 +243,12 @@ class TrackingBoard:
         better, worse, counted = {}, {}, {}
         for entry, result in self.entries.items():
             if name in result.searches:
-                pairs = [(counted_errors(each, limit), each) for each in result.searches[name]]
-                pairs.sort(key=lambda pair: float(np.median(pair[0])))
-                (better[entry], _), (worse[entry], counted[entry]) = pairs[0], pairs[-1]
+                errors_of = functools.partial(counted_errors, limit=limit)
+                searches = sorted(
+                    result.searches[name], key=lambda found: float(np.median(errors_of(found)))
+                )
+                better[entry], worse[entry] = errors_of(searches[0]), errors_of(searches[-1])
+                counted[entry] = searches[-1]
         comparison = Comparison(worse, FLOOR, halves=better, rivals=RIVALS)
         leads = comparison.better[0]
         beaten = dict(zip(comparison.laws, leads.any(axis=0).tolist(), strict=True))
@@ -255,7 +258,7 @@ class TrackingBoard:
             standing = Standing(
                 entry=entry,
                 error=error,
-                other=float(np.median(better[entry])),
+                better=float(np.median(better[entry])),
                 interval=median_of(errors[None])[1:3],
                 counted=counted[entry],
                 leads=not beaten[entry] and error < math.inf,

@@ -39,7 +39,7 @@ class Block:
     """Laws compared on one plant in one condition. A law's name is the key of the mappings."""
 
     comparison: Comparison
-    at: int = 0  # which of its blocks
+    index: int = 0  # which of its blocks
     metric: str
     plant: str
     condition: str
@@ -50,11 +50,11 @@ class Block:
 
     def _named(self, chosen: Array) -> Names:
         """Return the laws of which an array (laws, blocks) is true."""
-        return tuple(np.array(self.comparison.laws)[chosen[:, self.at]].tolist())
+        return tuple(np.array(self.comparison.laws)[chosen[:, self.index]].tolist())
 
     def _by_law(self, values: Array) -> dict[str, Any]:
         """Return law -> its value in an array (laws, blocks)."""
-        return dict(zip(self.comparison.laws, values[:, self.at].tolist(), strict=True))
+        return dict(zip(self.comparison.laws, values[:, self.index].tolist(), strict=True))
 
     @property
     def label(self) -> str:
@@ -102,18 +102,20 @@ class Block:
     @property
     def by_step(self) -> dict[str, Pair]:
         """Medians at the physics step and at half of it, of laws where they differ much."""
-        changes = {law: self.comparison.step_change(self.at, law) for law in self.comparison.laws}
+        changes = {
+            law: self.comparison.step_change(self.index, law) for law in self.comparison.laws
+        }
         return {law: change for law, change in changes.items() if change}
 
     @property
     def runs(self) -> int:
         """Distinct runs; in the other seeds every law repeats the result of an earlier one."""
-        return int(self.comparison.seeds[self.at])
+        return int(self.comparison.seeds[self.index])
 
     @property
     def order(self) -> list[str]:
         """The winner first, then by failed runs, then by median."""
-        winner = self.comparison.winners[self.at]
+        winner = self.comparison.winners[self.index]
         lacking, medians = self.lacking, self.medians
         return sorted(medians, key=lambda law: (law != winner, lacking[law], medians[law]))
 
@@ -135,7 +137,7 @@ class Block:
     def verdict(self) -> Verdict | None:
         """Who wins, or why nobody does; None for a single law."""
         laws = self.comparison.laws
-        winner = self.comparison.winners[self.at]
+        winner = self.comparison.winners[self.index]
         barred = tuple(law for law in self.untuned if law != winner)
         if len(laws) < 2:
             return None
@@ -153,7 +155,7 @@ class Block:
         if comparison.shares:
             return Lead(law=winner, rival="", metric=self.label)
         rivals = [law for law in self.order[1:] if law not in self.few]
-        rival, effect = nearest(comparison, self.at, winner, rivals)
+        rival, effect = nearest(comparison, self.index, winner, rivals)
         lacking = self.lacking[rival]
         numbers = {}
         if not lacking:
@@ -188,8 +190,8 @@ class Block:
             return Tied(metric=metric, laws=lowest, floor=self.floor)
         if needed := self.needed:
             return Open(metric=metric, laws=laws, needed=needed, unit=self.unit)
-        starred = comparison.best[:, self.at]
-        if len(best) > 1 and comparison.level[self.at][np.ix_(starred, starred)].all():
+        starred = comparison.best[:, self.index]
+        if len(best) > 1 and comparison.level[self.index][np.ix_(starred, starred)].all():
             return Tied(metric=metric, laws=best)
         hidden, charged = self._hidden
         return Open(
@@ -210,7 +212,7 @@ class Block:
         if not comparison.shares:
             first, *rivals = [law for law in self.order if law in best] or [""]
             for rival in rivals:
-                pair = self.at, first, rival
+                pair = self.index, first, rival
                 leads.append((comparison.visible(*pair), comparison.charged(*pair)))
         return max(leads, key=lambda lead: (not math.isnan(lead[0]), lead[0]))
 
@@ -218,7 +220,7 @@ class Block:
     def behind(self) -> dict[str, Trails]:
         """The laws that others are better than."""
         comparison, order = self.comparison, self.order
-        better = comparison.better[self.at]
+        better = comparison.better[self.index]
         behind = {}
         for law in order[1:]:
             beaten_by = better[:, comparison.laws.index(law)]
@@ -227,7 +229,7 @@ class Block:
                 continue
             times = math.nan
             if not comparison.shares:
-                effect = comparison.effect(self.at, ahead[0], law)
+                effect = comparison.effect(self.index, ahead[0], law)
                 if not effect.below and 0.0 < effect.value < math.inf:
                     times = 1.0 / effect.value
             behind[law] = Trails(
@@ -242,14 +244,14 @@ class Block:
         """The largest number of samples of any two laws; for one law, of its runs."""
         if len(self.comparison.laws) == 1:
             return self.runs
-        return int(self.comparison.samples[self.at].max())
+        return int(self.comparison.samples[self.index].max())
 
     @property
     def _sets(self) -> tuple[int, bool]:
         """The smallest number of sets of gains of a law that has several, 1 if none has, and
         whether a law has one set.
         """
-        sets = self.comparison.sets[:, self.at]
+        sets = self.comparison.sets[:, self.index]
         return min(sets[sets > 1].tolist(), default=1), bool((sets == 1).any())
 
     @property

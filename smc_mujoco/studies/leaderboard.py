@@ -184,12 +184,12 @@ def _board(
     )
     untuned = () if defaults else _untuned(group.sources)
     blocks = []
-    for at, (k, scenario) in enumerate(zip(scores.blocks, ran, strict=True)):
+    for index, (k, scenario) in enumerate(zip(scores.blocks, ran, strict=True)):
         plant, condition = group.group.blocks[k]
         blocks.append(
             Block(
                 comparison=comparison,
-                at=at,
+                index=index,
                 metric=metric,
                 plant=plant,
                 condition=condition,

@@ -437,8 +437,8 @@ class Recommendation(Answer):
             combined = again({"--condition": names, "--out": f"{self.folder}-at-once"})
             return NextStep(combined, "searches gains for all conditions at once")
         if self.form == "unneeded" and self.runs.count == self.runs.total:
-            asked = "+".join(self.settled[self.law.name]).split("+")
-            harder = next((name for name in HARDER if name not in asked), HARDER[-1])
+            conditions = "+".join(self.settled[self.law.name]).split("+")
+            harder = next((name for name in HARDER if name not in conditions), HARDER[-1])
             command = again({"--condition": harder, "--out": f"{self.folder}-{harder}"})
             return NextStep(command, "asks for more, so that a law may be needed")
         if self.untried_laws:
@@ -638,7 +638,7 @@ def lost_runs(comparison: Comparison | None) -> dict[str, int]:
 def _level(margin: Margin) -> Fact:
     """Return a level that is withstood, such as "mass x 1.6"."""
     in_unit = {"1": "factor", "s": "time"}.get(margin.unit, "value")
-    about = {"kind": LEVELS.get(margin.kind, margin.kind), "unit": margin.unit}
+    about = {"what": LEVELS.get(margin.kind, margin.kind), "unit": margin.unit}
     return Fact("level", **about, open="≥ " if margin.open else True, **{in_unit: margin.value})
 
 

@@ -64,6 +64,6 @@ def table_of(scores: dict[str, np.ndarray], metric: str = "itae", **columns) -> 
 
 def changed(block, **facts):
     """Return a block of a board with other facts than its comparison's."""
-    other = copy.copy(block)
-    other.__dict__.update(facts)
-    return other
+    twin = copy.copy(block)
+    twin.__dict__.update(facts)
+    return twin

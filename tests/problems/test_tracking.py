@@ -12,7 +12,13 @@ import pytest
 import smc_mujoco as smc
 from smc_mujoco.answers.answers import screen_lines
 from smc_mujoco.common.errors import ScenarioError
-from smc_mujoco.problems import commands, tracking_page, tracking_results, tracking_search
+from smc_mujoco.problems import (
+    commands,
+    tracking_page,
+    tracking_picture,
+    tracking_results,
+    tracking_search,
+)
 from smc_mujoco.problems.tracking import TrackingProblem, tracking_suite, tracking_suites
 from smc_mujoco.problems.tracking_entry import tracking_entry
 from smc_mujoco.problems.tracking_results import TrackingBoard, enter_tracking, read_result
@@ -189,7 +195,7 @@ def test_an_entry_leads_only_if_it_is_better_in_every_pairing_of_the_searches():
     assert boards[0].told_apart == 0.0
     assert boards[1].leaders == ["pid"]
     assert boards[1].told_apart == 1.0
-    errors = {each.entry: (each.other, each.error) for each in boards[0].standings}
+    errors = {standing.entry: (standing.better, standing.error) for standing in boards[0].standings}
     assert errors["pid"] == pytest.approx((1.0, 9.0), rel=0.05)
     assert board_of(lucky, steady).shares() == {"pid": 1.0, "adrc": 0.5}
     heading = screen_lines(board_of(lucky, steady).standing("pid"))[0]
@@ -205,7 +211,7 @@ def test_errors_below_the_floor_are_level_and_one_that_is_the_same_without_is_ma
     finer = result("adrc", {a: (0.2, 0.2), b: (5.0, 5.0)}, seed=4)
     boards = board_of(fine, finer).problems
     assert {*boards[0].leaders} == {"pid", "adrc"}
-    assert [(each.entry, each.of_load) for each in boards[1].standings] == [
+    assert [(standing.entry, standing.of_load) for standing in boards[1].standings] == [
         ("pid", False),
         ("adrc", True),
     ]
@@ -218,7 +224,7 @@ def test_a_search_that_varies_beyond_the_limit_has_no_error():
     (board, _) = board_of(busy, calm).problems
     assert board.leaders == ["adrc"]
     last = board.standings[-1]
-    assert (last.entry, last.other, last.error) == ("pid", math.inf, math.inf)
+    assert (last.entry, last.better, last.error) == ("pid", math.inf, math.inf)
 
 
 def test_an_entry_changes_a_page_by_its_row_and_what_it_tops_alone():
@@ -231,6 +237,21 @@ def test_an_entry_changes_a_page_by_its_row_and_what_it_tops_alone():
     assert sum("`hodob`" in line for line in added) == 2  # a row in each problem
     row = next(line for line in before if line.startswith("| `pid`<br>"))
     assert row in after
+
+
+def test_a_page_has_the_row_of_the_entry_that_it_is_written_for_however_far_behind():
+    names = [task.name for task in tracking_suite("smc-load@1").problems[:2]]
+    laws = ("pid", "adrc", "indi", "odrive", "loop_shaping", "mpc", "hodob")
+    entries = []
+    for seed, law in enumerate(laws):
+        level = 3.0 ** (1 + seed)
+        entries.append(result(law, dict.fromkeys(names, (level, level)), seed=seed))
+    board = board_of(*entries)
+    assert "| `hodob`<br>" not in tracking_page.page(board, "p.svg")
+    own = tracking_page.page(board, "p.svg", "hodob")
+    assert own.count("| `hodob`<br>") == 2
+    assert own.count("1 more entry.") == 2  # mpc
+    assert "hodob" in tracking_picture.shown(board, "hodob")
 
 
 def pairs_in_doubt(board):

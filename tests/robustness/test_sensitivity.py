@@ -409,7 +409,7 @@ def test_runs_without_a_score_are_counted_and_too_many_are_not_explained():
     assert 0 < result.unscored < 16
     assert f"; {result.unscored} have none, and count as the worst" in result.sentences[1]
     many = dataclasses.replace(result, unscored=20)
-    assert many.sentences[0].startswith("first: no axis")
+    assert many.sentences[0].startswith("explains: no axis")
 
 
 def test_a_broken_law_is_named():
@@ -428,12 +428,12 @@ def test_a_broken_law_is_named():
 def test_one_axis_is_named_only_if_the_intervals_part():
     over = smc.Uncertainty(mass=(0.5, 2.0), bound=(0.2, 1.0))
     result = smc.sensitivity(scenario(law="none"), over, points=16)
-    assert result.sentences[0].startswith("first: mass, ")
+    assert result.sentences[0].startswith("explains: mass, ")
     total = result.axes[0].total
     first = result.axes[0]._replace(total=total._replace(low=0.8))
     reached = result.axes[1]._replace(total=total._replace(median=0.0, low=0.0, high=0.9))
     same = dataclasses.replace(result, axes=(first, reached))
-    assert same.sentences[0].startswith("first: open")
+    assert same.sentences[0].startswith("explains: open")
     assert "no axis" in dataclasses.replace(result, values=np.ones(32)).sentences[0]
     partly_failed = dataclasses.replace(result, failed=np.arange(32) < 5, regions=())
     assert partly_failed.sentences[2].startswith("fail: 5 of 32 runs (")
