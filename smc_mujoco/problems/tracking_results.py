@@ -196,7 +196,7 @@ def counted_errors(found: Found, limit: float) -> Array:
 
 
 @keyword_dataclass
-class Standing:
+class ProblemStanding:
     """An entry in one problem."""
 
     entry: str
@@ -217,7 +217,7 @@ class ProblemBoard:
     """The entries of a suite in one problem."""
 
     problem: str
-    standings: tuple[Standing, ...]  # least error first
+    standings: tuple[ProblemStanding, ...]  # least error first
     told_apart: float  # share of the pairs in which one leads the other
 
     @property
@@ -255,7 +255,7 @@ class TrackingBoard:
         standings = []
         for entry, errors in worse.items():
             error = float(np.median(errors))
-            standing = Standing(
+            standing = ProblemStanding(
                 entry=entry,
                 error=error,
                 better=float(np.median(better[entry])),
