@@ -280,7 +280,7 @@ class Block:
         win, rank = needed_to_win(self.comparison.family), needed_to_rank(len(laws))
         units = self._by_law(comparison.units)
         needed = dict.fromkeys(self.few, min(win, rank))
-        if comparison.winners[self.at] is None and self._named(comparison.best):
+        if comparison.winners[self.index] is None and self._named(comparison.best):
             rivals = self._named(~comparison.worse & ~comparison.away.any(axis=2))
             needed |= {law: rank for law in rivals if units[law] < rank}
         if len(laws) - len(self.few) < 2:
