@@ -12,11 +12,10 @@ If an entry is wrong, one sentence says why. It is an error if the entry was ask
 and a `PackageWarning` if all are listed, because the others still work.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import functools
 import importlib
+import importlib.metadata
 import importlib.util
 import itertools
 import operator
@@ -26,14 +25,12 @@ import warnings
 from collections import ChainMap
 from collections.abc import Callable, Iterator, Mapping
 from importlib.machinery import ModuleSpec
+from importlib.metadata import EntryPoint
 from types import ModuleType
-from typing import TYPE_CHECKING, Any, Generic, TypeVar
+from typing import Any, Generic, TypeVar
 
 from smc_mujoco.common.cached import cached_property
 from smc_mujoco.common.errors import ScenarioError, shown, users_stacklevel, words
-
-if TYPE_CHECKING:
-    from importlib.metadata import EntryPoint
 
 NAME = operator.attrgetter("name")
 PREFIX = "smc_mujoco."
@@ -176,7 +173,7 @@ class Catalogue(Mapping[str, T_co]):
     def __len__(self) -> int:
         return sum(1 for _ in self)
 
-    def __or__(self, more: Mapping[str, U]) -> Catalogue[T_co | U]:
+    def __or__(self, more: Mapping[str, U]) -> "Catalogue[T_co | U]":
         """Return the entries of both.
 
         Of two entries of the library with one name, that of `other` is taken.
@@ -256,9 +253,7 @@ def _points() -> dict[str, list[EntryPoint]]:
 
     It reads their metadata, and imports nothing.
     """
-    from importlib import metadata  # with email, which a listing need not wait for
-
-    installed = metadata.entry_points()
+    installed = importlib.metadata.entry_points()
     by_group = {}
     for group in installed.groups:
         if group.startswith(PREFIX):

@@ -11,7 +11,6 @@ import contextlib
 import dataclasses
 import functools
 import re
-import threading
 from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from typing import Any
 
@@ -20,7 +19,6 @@ import numpy as np
 from smc_mujoco.common import mjcb
 from smc_mujoco.common.errors import BrokenLawError, ScenarioError, shown, unknown
 from smc_mujoco.common.jit import NotCompilable, Uncompiled
-from smc_mujoco.common.process import free_after_fork
 from smc_mujoco.control import joint_law
 from smc_mujoco.control.component import Component
 from smc_mujoco.control.estimator import Reading
@@ -59,9 +57,6 @@ RETURNS_OTHERS = re.compile(r"it returns (None|\d+ numbers) instead of")
 UNKNOWN_FIELD = re.compile(
     r"Unknown attribute '(\w+)' of type (Measurement|JointMeasurement|Reading|Parameters)\b"
 )
-# held while something is compiled, so that two threads do not compile the same thing twice
-_one_at_a_time = threading.RLock()
-free_after_fork(_one_at_a_time)
 FIELDS = {record.__name__: record._fields for record in (Measurement, JointMeasurement, Reading)}
 # the records of arrays, where they are no FUNCTIONs
 KINDS = {
@@ -115,11 +110,10 @@ def prepare(scenario: object) -> Prepared:
             raise ScenarioError(
                 f"{part.kind} {part.name!r} came from a file without its code: give the {part.kind}"
             )
-    with _one_at_a_time:
-        shared = mechanism(scenario)
-        reason = why_not(scenario)
+    shared = mechanism(scenario)
     check_start(shared, scenario)
     key = shared, scenario.control_period, scenario.samples
+    reason = why_not(scenario)
     _refuse_mistakes(scenario.resolved, reason)
     part_jump.check(scenario.resolved)
     return Prepared(scenario, reason, shared, key)

@@ -10,17 +10,13 @@ after it. `verdict` says how checks become verdicts.
 
 from __future__ import annotations
 
-import contextvars
 import dataclasses
-import functools
-import threading
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from smc_mujoco.analysis.paired_runs import check_table
-from smc_mujoco.common.attended import attended
 from smc_mujoco.common.constraints import Called
 from smc_mujoco.common.errors import ScenarioError, find, items_of, shown, unknown
 from smc_mujoco.common.files import with_ending, write_json
@@ -30,11 +26,9 @@ from smc_mujoco.evidence.audit.claim_runs import ClaimRuns, RunResult, Used, of_
 from smc_mujoco.evidence.audit.paper import ClaimEntry, Paper, failed
 from smc_mujoco.evidence.audit.paper import paper as find_paper
 from smc_mujoco.evidence.audit.verdict import Beside, Check, Claim, Claims, Evidence, judged
-from smc_mujoco.simulation.run import cores
 from smc_mujoco.studies.table import Table
 
 DEFAULT_PAPER = "gaber"  # the paper that the suite was built for
-AT_ONCE = 3  # claims: while the runs of one are simulated, others prepare and score theirs; chosen
 CURE = "return measure -> number, or measure -> {case: number}"
 
 
@@ -94,7 +88,7 @@ def audit(
       threads: simulations at once; None for one per available core.
       table: a study's table, whose runs are not made again.
       report: called with how much is done and how much there is: each claim counts once for each
-        of its plants, laws and sets of gains.
+        of its plants and each set of gains.
 
     Returns:
       An `Audit`: its `claims` with their verdicts, and `save(path)`.
@@ -112,18 +106,22 @@ def audit(
     if table is not None:
         check_table(table)
         rows = of_table(table)
-    pieces = []
     shared: dict[str, RunResult] = {}
     entries = select_claims(audited, only)
-    for name in sets(audited, gains, quick):
-        runs = ClaimRuns(audited, name, quick, {}, threads, rows, shared)
-        pieces += [ClaimUnderGains(entry, runs.of(entry)) for entry in entries]
-    _measure_all(pieces, min(cores(threads), AT_ONCE), report)
+    names = sets(audited, gains, quick)
     evidence: dict[str, dict[str, Evidence]] = defaultdict(dict)
     used: dict[str, dict[str, dict[str, Used]]] = defaultdict(dict)
-    for piece in pieces:
-        evidence[piece.entry.id][piece.runs.gains] = piece.evidence
-        used[piece.entry.id][piece.runs.gains] = piece.runs.used
+    late_last = sorted(entries, key=lambda entry: entry.late)
+    needed = len(names) * sum(map(_plants, entries))
+    done = 0
+    for name in names:
+        runs = ClaimRuns(audited, name, quick, {}, threads, rows, shared)
+        for entry in late_last:
+            its_runs = runs.of(entry)
+            evidence[entry.id][name] = measure(entry, its_runs)
+            used[entry.id][name] = its_runs.used
+            done += _plants(entry)
+            report(done, needed)
     verdicts = Claims()
     for entry in entries:
         claim = judged(entry, evidence[entry.id])
@@ -134,80 +132,9 @@ def audit(
     return Audit(audited, verdicts, quick, dict(used), table is None)
 
 
-@dataclasses.dataclass
-class ClaimUnderGains:
-    """A claim under one set of gains, and its evidence once it is measured."""
-
-    entry: ClaimEntry
-    runs: ClaimRuns
-    evidence: Evidence = ()
-
-    @property
-    def alone(self) -> bool:
-        """Whether nothing else is measured meanwhile: a timing, or what looks at all other runs."""
-        return bool(self.entry.varies) or self.entry.late
-
-    @property
-    def size(self) -> int:
-        """About how much there is to do: the claim's plants times its laws."""
-        return max(1, len(self.entry.plants)) * max(1, len(self.entry.laws))
-
-
-def _measure_all(
-    pieces: Sequence[ClaimUnderGains], at_once: int, report: Callable[[int, int], None]
-) -> None:
-    """Measure claims: those that need not be alone, then timings, then those that are late.
-
-    What is measured and what is raised do not depend on how many are measured at once.
-    """
-    sizes: list[int] = []
-    telling = threading.Lock()
-    for piece in pieces:
-        piece.runs.scored = {}
-
-    def finish(piece: ClaimUnderGains) -> None:
-        piece.evidence = measure(piece.entry, piece.runs)
-        with telling:
-            sizes.append(piece.size)
-            report(sum(sizes), sum(piece.size for piece in pieces))
-
-    _finish_at_once([piece for piece in pieces if not piece.alone], at_once, finish)
-    alone = [piece for piece in pieces if piece.alone]
-    for piece in sorted(alone, key=lambda piece: piece.entry.late):
-        if piece.entry.late:
-            for earlier in pieces:
-                if earlier.runs.gains == piece.runs.gains:
-                    piece.runs.scored |= earlier.runs.scored
-        _finish_at_once([piece], 1, finish)
-
-
-def _finish_at_once(
-    pieces: Sequence[ClaimUnderGains], at_once: int, finish: Callable[[ClaimUnderGains], None]
-) -> None:
-    """Finish pieces in threads; raise what the first of them raises, in their order."""
-    waiting = enumerate(pieces)
-    raised: dict[int, BaseException] = {}
-    stopped = threading.Event()
-
-    def go_on(steps: int) -> None:
-        if stopped.is_set():
-            raise KeyboardInterrupt  # in a thread that nobody waits for
-
-    def work() -> None:
-        for i, piece in waiting:
-            piece.runs.report = go_on
-            try:
-                finish(piece)
-            except BaseException as error:
-                raised[i] = error
-            if raised or stopped.is_set():
-                return
-
-    # each with the context of this thread, such as the words of the command
-    jobs = [functools.partial(contextvars.copy_context().run, work) for _ in range(at_once)]
-    attended(jobs, stopped.set)
-    if raised:
-        raise raised[min(raised)]
+def _plants(entry: ClaimEntry) -> int:
+    """Return how many plants a claim is about, at least 1."""
+    return max(1, len(entry.plants))
 
 
 def claims(

@@ -30,7 +30,7 @@ from smc_mujoco.evidence.audit.paper import ClaimEntry, Paper
 from smc_mujoco.evidence.audit.verdict import Check, Threshold, check
 from smc_mujoco.metrics.catalogue import metrics
 from smc_mujoco.simulation.conditions import DURATION, Condition
-from smc_mujoco.simulation.run import Report, stream
+from smc_mujoco.simulation.run import stream
 from smc_mujoco.simulation.run_key import Hashes, key
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import ARRAYS, Trace
@@ -99,7 +99,6 @@ class ClaimRuns:
     thresholds: Mapping[str, Threshold] = frozen({})  # of the claim, by measure
     fields: Mapping[str, Any] = frozen({})  # of the claim's scenarios
     searched: Mapping[str, Numbers] = frozen({})  # law -> gains in place of the set's
-    report: Report = lambda steps: None  # called as runs are stepped; what it raises ends them
 
     def of(self, entry: ClaimEntry) -> "ClaimRuns":
         """Return these runs as a claim sees them: with its names and fields, and none used yet."""
@@ -220,7 +219,7 @@ class ClaimRuns:
             if name not in results:
                 new[name] = scenario
         names = list(new)
-        for index, trace in stream(list(new.values()), self.threads, self.report):
+        for index, trace in stream(list(new.values()), self.threads):
             law = trace.scenario.law
             results[names[index]] = RunResult.of(law.name, law.gains, result_columns(trace))
         for name, scenario in keyed:
@@ -252,7 +251,7 @@ class ClaimRuns:
     def traces(self, scenarios: Iterable[Scenario]) -> list[Trace]:
         """Return the traces of scenarios, in order; they are not kept."""
         keyed = self._keyed(scenarios)
-        done = dict(stream([scenario for _, scenario in keyed], self.threads, self.report))
+        done = dict(stream([scenario for _, scenario in keyed], self.threads))
         traces = [done[i] for i in sorted(done)]
         for (name, scenario), trace in zip(keyed, traces, strict=True):
             parts = []
