@@ -66,7 +66,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     rows = realaigym.experiments(robot)
     of_2025 = realaigym.global_experiments(robot)
     if options.entry:
-        entry = entries.read(options.entry)
+        entry = entries.read_entry(options.entry)
         rows = of_2025 = {entry.name: realaigym.on_board(robot, entry.law(robot))}
     console = Console()
     traces = dict(zip(rows, smc.run(list(rows.values())), strict=True))

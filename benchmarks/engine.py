@@ -116,7 +116,7 @@ def picture(path: str, device: str, side: int = 1000) -> None:
     began = time.perf_counter()
     basin = smc.design.basin("inverted_pendulum", law, points=(side, side), device=device)
     seconds = time.perf_counter() - began
-    region_figure.draw([basin], path)
+    region_figure.draw_regions([basin], path)
     share = 100.0 * basin.share
     print(f"{path}: {share:.3f} % of {side**2:,} starts in {seconds:.1f} s; {basin.checked}")
 

@@ -114,7 +114,7 @@ def wanted(laws: list[str], again: bool) -> list[Task]:
         if record is None or "rule" in record:
             return True
         sets = range(len(record["sets"]))
-        laws = [gain_sets.law(task.plant, task.law, task.gains, i) for i in sets]
+        laws = [gain_sets.law_with_gains(task.plant, task.law, task.gains, i) for i in sets]
         return any(law.source.outside for law in laws)
 
     return [

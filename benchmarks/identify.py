@@ -25,7 +25,7 @@ import numpy as np
 from numba import njit
 
 import smc_mujoco as smc
-from smc_mujoco.identification.identify import check
+from smc_mujoco.identification.identify import held_out_fit
 from smc_mujoco.identification.own_rig import own_rig
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
@@ -282,7 +282,7 @@ def beside_published(arm: Any, names: list[str], used: tuple, others: dict[str, 
     print(f"{time.process_time() - begin:.0f} s of processor\n{identified}")
     before = own_rig(arm, [name for name in names if name.endswith(".frictionloss")])
     for name, record in others.items():
-        ours, theirs = (check(rig, record).by_pieces for rig in (identified.rig, before))
+        ours, theirs = (held_out_fit(rig, record).by_pieces for rig in (identified.rig, before))
         for column, fit in ours.items():
             published = f"published numbers {theirs[column]:.2f} %"
             print(f"held out {name}, {column} in pieces of 1 s: {fit:.2f} %, {published}")

@@ -27,9 +27,9 @@ import smc_mujoco as smc
 from smc_mujoco.analysis.law_time import law_time
 from smc_mujoco.common.jit import call
 from smc_mujoco.control.component import Component
-from smc_mujoco.control.estimator import catalogue as estimators
+from smc_mujoco.control.estimator import estimator_catalogue as estimators
 from smc_mujoco.control.law import Measurement
-from smc_mujoco.control.law import catalogue as laws
+from smc_mujoco.control.law import law_catalogue as laws
 from smc_mujoco.simulation import cfunctions
 from smc_mujoco.simulation.callback import callback, installed
 from smc_mujoco.simulation.grid import case

@@ -71,7 +71,7 @@ def laws_of(kind: str, one: problems.Problem) -> dict[str, Law]:
         return {"zero": controls.zero(one.plant)} | oracles
     plant = find_plant(one.plant)
     return {
-        law: gain_sets.law(plant, law)
+        law: gain_sets.law_with_gains(plant, law)
         for law in gain_sets.general()
         if gain_sets.in_set(plant, law, "tuned")
     }

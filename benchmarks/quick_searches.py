@@ -58,7 +58,7 @@ def medians(task: search.TuningTask, found: list[search.SearchResult]) -> np.nda
 def searched(plant: Plant, name: str, quick: bool) -> tuple[np.ndarray, int, float]:
     """Return J of the sets of a law, how many searches were stuck, and seconds of a search."""
     budget = quick_search.BUDGET if quick else BUDGET
-    task = search.task_of(plant, coerce.law(name), GOAL, budget, 0, 1)._replace(quick=quick)
+    task = search.task_of(plant, coerce.coerced_law(name), GOAL, budget, 0, 1)._replace(quick=quick)
     start = time.process_time()
     search_results = [
         task.search(i, "", lambda count: None) for i in range(LOOKS[0] if quick else WHOLE)

@@ -30,7 +30,7 @@ from smc_mujoco.common.errors import find
 from smc_mujoco.common.files import read_json
 from smc_mujoco.draw import colouring, style
 from smc_mujoco.draw import page as pages
-from smc_mujoco.identification.published_rig import catalogue
+from smc_mujoco.identification.published_rig import rig_catalogue
 
 FILE = Path(__file__).with_suffix(".json")
 UNFITTED = "unfitted"
@@ -79,7 +79,7 @@ class TwinFigure:
     @property
     def use(self) -> str:
         """What the record was for the twin: "unfitted", "fitted on" or "held out"."""
-        sources = catalogue()[self.rig].identified_from
+        sources = rig_catalogue()[self.rig].identified_from
         if self.record in sources:
             return FITTED
         return HELD_OUT if sources else UNFITTED
@@ -168,13 +168,13 @@ def rows(rig: str = "") -> list[TwinFigure]:
     Raises:
       ScenarioError: an unknown rig.
     """
-    name = rig and find("rig", rig, catalogue()).name
+    name = rig and find("rig", rig, rig_catalogue()).name
     return [row for row in _stored()[0] if name in ("", row.rig)]
 
 
 def orders(rig: str = "") -> list[Order]:
     """Return the orders of laws on the machines that ran several, as `rows`."""
-    name = rig and find("rig", rig, catalogue()).name
+    name = rig and find("rig", rig, rig_catalogue()).name
     return [row for row in _stored()[1] if name in ("", row.rig)]
 
 
@@ -250,7 +250,7 @@ def twins_page(rows: Sequence[TwinFigure]) -> Figure:
 def twins_figure(rows: Sequence[TwinFigure], path: str | Path) -> list[Path]:
     """Write `twins_page` to PATH.svg and PATH.png."""
     paths = pages.files(Path(path).with_suffix(""))
-    pages.write(twins_page(rows), paths)
+    pages.write_page(twins_page(rows), paths)
     return paths
 
 

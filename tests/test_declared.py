@@ -36,10 +36,10 @@ from smc_mujoco.common.constraints import (
     Whole,
 )
 from smc_mujoco.common.errors import shown
-from smc_mujoco.control.estimator import catalogue as estimators
-from smc_mujoco.control.law import catalogue as laws
-from smc_mujoco.control.surface import catalogue as surfaces
-from smc_mujoco.mechanisms.plant import catalogue as plants
+from smc_mujoco.control.estimator import estimator_catalogue as estimators
+from smc_mujoco.control.law import law_catalogue as laws
+from smc_mujoco.control.surface import surface_catalogue as surfaces
+from smc_mujoco.mechanisms.plant import plant_catalogue as plants
 from smc_mujoco.simulation.scenario import Resolved
 from smc_mujoco.simulation.signals import Signal
 from smc_mujoco.simulation.workers import ExecutorAddress

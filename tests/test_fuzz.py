@@ -49,7 +49,9 @@ def test_calls_with_odd_arguments_end_well_or_in_a_sentence(part, cases, tmp_pat
     """The first cases have what was a foreign error once: arrays as flags, lists and tables."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("MUJOCO_GL", "disabled")
-    monkeypatch.setattr(gl, "missing", lambda: "not here")  # else it is kept for later tests
+    monkeypatch.setattr(
+        gl, "missing_renderer", lambda: "not here"
+    )  # else it is kept for later tests
     assert [why for _, why in (attack.case(part, 0, i) for i in range(cases)) if why] == []
 
 

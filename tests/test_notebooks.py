@@ -113,8 +113,8 @@ def test_a_notebook_is_kept_without_outputs_as_jupyter_saves_it(path):
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
 @pytest.mark.slow
 def test_a_notebook_runs_and_shows_what_its_text_says(path, tmp_path):
-    if any("smc.show(" in text for text in code(path)) and gl.missing():
-        pytest.skip(str(gl.missing()))
+    if any("smc.show(" in text for text in code(path)) and gl.missing_renderer():
+        pytest.skip(str(gl.missing_renderer()))
     said = textwrap.dedent(SAID[path.stem])
     done = python(KERNEL, path, "shown.json", QUICK, said, folder=tmp_path)
     assert done.stdout == ""

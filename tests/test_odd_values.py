@@ -156,7 +156,7 @@ def test_numba_without_its_compiler_is_named():
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork")
 @pytest.mark.filterwarnings("ignore:.*use of fork")
 def test_a_child_of_a_process_that_drew_draws_nothing(monkeypatch):
-    monkeypatch.setattr(gl, "missing", lambda: None)
+    monkeypatch.setattr(gl, "missing_renderer", lambda: None)
     monkeypatch.setattr(gl, "_begun", True)
     child = os.fork()
     if child == 0:

@@ -104,8 +104,8 @@ def test_code_runs_as_it_stands_and_writes_the_files_that_it_names(
 ):
     if annexes.lacking(block):
         pytest.skip("it uses an annex that is missing")
-    if '.png", at=' in block and gl.missing():
-        pytest.skip(gl.missing())
+    if '.png", at=' in block and gl.missing_renderer():
+        pytest.skip(gl.missing_renderer())
     if "dm_control_env" in block:
         dm_control_suite()
     for package in ("gymnasium", "optuna"):
@@ -178,7 +178,7 @@ def check_command(line: str, known: dict) -> None:
         of_template.add(path.stem)
     if word == "run" and arguments and arguments[0] not in {"NAME", *of_template}:
         assert isinstance(
-            scene.read(
+            scene.read_scene(
                 scene.find(str(ROOT / arguments[0]) if "/" in arguments[0] else arguments[0])
             ),
             smc.Scene,
@@ -233,7 +233,7 @@ def test_readme_s_times_are_those_of_the_benchmark_of_waits():
 
 def results(folder: Path) -> set[str]:
     """The traces that a run of a scene writes to its folder."""
-    runs = scene.read(scene.find(folder.name)).runs()
+    runs = scene.read_scene(scene.find(folder.name)).runs()
     return {
         (folder / f"{slug(condition)}-{slug(label)}.npz").as_posix() for condition, label, _ in runs
     }

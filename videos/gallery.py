@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 import smc_mujoco as smc
 from smc_mujoco.control.law import Law
-from smc_mujoco.draw.film.film import Frames, write
+from smc_mujoco.draw.film.film import Frames, write_film
 from smc_mujoco.mechanisms.plant import Plant
 
 FOLDER = Path(__file__).parent / "gallery"
@@ -126,5 +126,5 @@ CLIPS = {  # name of the clip's file -> what it shows
 
 if __name__ == "__main__":
     for name, clip in CLIPS.items():
-        path = write(clip.frames(), FOLDER / f"{name}.webp")
+        path = write_film(clip.frames(), FOLDER / f"{name}.webp")
         print(f"{path.relative_to(FOLDER.parents[1])}  {path.stat().st_size / 1e6:.2f} MB")

@@ -23,15 +23,15 @@ from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.text import capital
 from smc_mujoco.control import gain_sets
 from smc_mujoco.control.component import Template
-from smc_mujoco.control.estimator import catalogue as estimators
-from smc_mujoco.control.law import Measurement, law
-from smc_mujoco.control.law import catalogue as laws
-from smc_mujoco.control.properties import PROPERTIES, reads, searched
-from smc_mujoco.control.surface import catalogue as surfaces
+from smc_mujoco.control.estimator import estimator_catalogue as estimators
+from smc_mujoco.control.law import Measurement, library_law
+from smc_mujoco.control.law import law_catalogue as laws
+from smc_mujoco.control.properties import PROPERTIES, reads, searched_gains
+from smc_mujoco.control.surface import surface_catalogue as surfaces
 from smc_mujoco.draw import wording
 from smc_mujoco.exchange.c.export_c import law_to_c
 from smc_mujoco.mechanisms.plant import Plant, model_path
-from smc_mujoco.mechanisms.plant import catalogue as plants
+from smc_mujoco.mechanisms.plant import plant_catalogue as plants
 
 GAINS = re.compile(r"(?:^|(?<=\. ))Gains?: ", re.MULTILINE)
 POWER = re.compile(r"\^(-?[\w./]+|\([^)]*\))")
@@ -225,7 +225,7 @@ def _tuned_gains(template: Template) -> str:
     rows = []
     for plant in plants():
         with contextlib.suppress(ScenarioError):  # no gains for this plant
-            values = gain_sets.law(plant, template.name).gains
+            values = gain_sets.law_with_gains(plant, template.name).gains
             numbers = " | ".join(f"{values[name]:.4g}" for name in names)
             rows.append(f"| [`{plant}`](../plants/{plant}.md) | {numbers} |")
     if not (rows and names):
@@ -296,7 +296,7 @@ def _properties(template: Template) -> str:
         "command": "$u$ is continuous" if template.continuous else "$u$ jumps",
         "arrives": arrives[template.finite_time],
         "conditions on the gains": conditions or "none on the gains alone",
-        "gains to choose": ", ".join(f"`{gain}`" for gain in searched(template)) or "none",
+        "gains to choose": ", ".join(f"`{gain}`" for gain in searched_gains(template)) or "none",
         "measures": measured or "nothing",
         "nominal model": "needed"
         if template.requires_model
@@ -370,7 +370,7 @@ def _prose(text: str, names) -> str:
 
 def _c_form(name: str) -> str:
     """Return the law in C99, without the header that all exported laws share."""
-    code = law_to_c(law(name)).rpartition(HEADER_END)[2].strip()
+    code = law_to_c(library_law(name)).rpartition(HEADER_END)[2].strip()
     words = (
         f"`smc-mujoco export {name}.c` writes this law as one file, with [the "
         "header](../c.md) at its top."

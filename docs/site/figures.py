@@ -82,7 +82,7 @@ def still(plant: str) -> bytes:
     import smc_mujoco as smc
     from smc_mujoco.common import gl
 
-    if gl.missing():
+    if gl.missing_renderer():
         return b""
     traces = smc.run([_case(plant, law, "nominal") for law in plant_laws(plant)])
     with tempfile.TemporaryDirectory() as folder:

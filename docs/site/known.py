@@ -12,11 +12,11 @@ from typing import Any
 import catalogue
 
 import smc_mujoco as smc
-from smc_mujoco.control.law import joint_catalogue as joint_laws
+from smc_mujoco.control.law import joint_law_catalogue as joint_laws
 from smc_mujoco.draw import wording
 from smc_mujoco.evidence.audit.paper import paper
 from smc_mujoco.evidence.audit.verdict import DERIVED, MARKS, OURS, PAPER, VERDICTS, WHOSE_WORDS
-from smc_mujoco.mechanisms.plant import catalogue as plants
+from smc_mujoco.mechanisms.plant import plant_catalogue as plants
 from smc_mujoco.metrics.catalogue import metrics
 from smc_mujoco.studies import scene
 

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from smc_mujoco.common.errors import find
-from smc_mujoco.control.law import Law, law
+from smc_mujoco.control.law import Law, library_law
 from smc_mujoco.control.source import SHIPPED, GainSearch
 from smc_mujoco.mechanisms.plant import Plant, Values, plant
 from smc_mujoco.metrics.conventions import last_exit
@@ -105,9 +105,9 @@ def gained(name: str, gains: Mapping[str, float] | None = None) -> Law:
     for gain in BY_INERTIA.get(name, ()):
         values[gain] = [values[gain] * joint for joint in inertia()]  # pyright: ignore[reportArgumentType]
     if name not in OUTER:
-        gained_law = law(name, **values)
+        gained_law = library_law(name, **values)
     else:
-        gained_law = law(OUTER[name], **values).on_computed_torque()
+        gained_law = library_law(OUTER[name], **values).on_computed_torque()
     if gains:
         return gained_law
     return gained_law.sourced(SHIPPED, GainSearch(rule="random draws", evaluations=DRAWS))
@@ -121,7 +121,7 @@ def hybrid(friction: bool = False) -> Law:
     if friction:
         arm_friction = arm().friction
         gains |= {"f1": arm_friction.p1, "f2": arm_friction.p2, "f3": arm_friction.p3}
-    hybrid_law = law("hybrid_sliding", **gains).sourced(SHIPPED)  # pyright: ignore[reportArgumentType]
+    hybrid_law = library_law("hybrid_sliding", **gains).sourced(SHIPPED)  # pyright: ignore[reportArgumentType]
     if friction:
         return hybrid_law.named("hybrid_with_friction")
     return hybrid_law

@@ -19,7 +19,7 @@ from numba import njit
 from smc_mujoco.common.aliases import Array
 from smc_mujoco.common.attended import attended
 from smc_mujoco.common.jit import NotCompilable, call
-from smc_mujoco.control.law import Law, law
+from smc_mujoco.control.law import Law, library_law
 from smc_mujoco.simulation import callback, cfunctions, state
 from smc_mujoco.simulation.prepare import prepare
 from smc_mujoco.simulation.run import ScenarioBatch
@@ -48,7 +48,7 @@ def law_time(scenario: Scenario) -> LawTime | None:
     if of_channel.joint:
         return None
     timed = of_channel.of_channel(scenario.plant.driven - 1)
-    reference = law("pid")
+    reference = library_law("pid")
     try:
         cfunctions.compile_component(timed)
     except NotCompilable:

@@ -16,8 +16,8 @@ from smc_mujoco.common.aliases import Array
 from smc_mujoco.common.errors import ScenarioError, has, items_of, one_line, shown
 from smc_mujoco.common.files import from_json
 from smc_mujoco.common.text import joined
-from smc_mujoco.control.source import Source, restore
-from smc_mujoco.mechanisms.plant import catalogue
+from smc_mujoco.control.source import Source, restored_source
+from smc_mujoco.mechanisms.plant import plant_catalogue
 from smc_mujoco.metrics.catalogue import CATALOGUE, metrics
 from smc_mujoco.metrics.conventions import groups as channel_groups
 from smc_mujoco.metrics.conventions import (
@@ -360,7 +360,7 @@ def unit_of_x(plant: str, ran: Sequence[Scenario | None]) -> str:
     """Return the unit of positions on a plant, by its name or from runs on it; "" where it is not
     known.
     """
-    library_plant = catalogue().get(plant)
+    library_plant = plant_catalogue().get(plant)
     if library_plant:
         return library_plant.unit
     for scenario in ran:
@@ -388,7 +388,7 @@ def sources(table: RunColumns, rows: Array) -> dict[str, tuple[Source, ...]]:
     for law, kind, search in sorted(of_laws, key=str):
         about = {"kind": kind, "search": search and json.loads(search)}
         earlier = by_law.get(law, ())
-        by_law[law] = (*earlier, restore(about))
+        by_law[law] = (*earlier, restored_source(about))
     return by_law
 
 

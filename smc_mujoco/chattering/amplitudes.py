@@ -122,7 +122,7 @@ def amplitudes(
             ticks.update(over_lag.lags)
         set_axes(ax, sorted(ticks), f"{plant.unit}/s")
         pages.set_head(page, style.FULL_WIDTH, title, handles, shared)
-        return pages.write(page, pages.files(path))
+        return pages.write_page(page, pages.files(path))
 
 
 class OverLag(NamedTuple):

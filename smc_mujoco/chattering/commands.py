@@ -52,7 +52,7 @@ def chatter(
     """
     with importing():
         from smc_mujoco.analysis.step_halving import step_halving
-        from smc_mujoco.chattering.cycle_tables import rows, table
+        from smc_mujoco.chattering.cycle_tables import cycle_rows, table
         from smc_mujoco.common.progress import bar
         from smc_mujoco.control import gain_sets
         from smc_mujoco.control.source import in_words
@@ -64,7 +64,7 @@ def chatter(
 
     terminal = Terminal(json)
     pictures = files(figure)
-    chosen = options.laws(law, gain_sets.LAWS)
+    chosen = options.parsed_laws(law, gain_sets.LAWS)
     options.check_files(None, *pictures)
     fields = {} if actuator is None else {"actuator": options.actuator(actuator)}
     machine = jointed(plant, "chattering")
@@ -80,7 +80,7 @@ def chatter(
     terminal.print(table(cases, channel, cycles, measured, changes))
     terminal.note(f"assumed: {_assumed(cycles)}", wrap=True)
     terminal.note(f"{sources}, {terminal.seconds:.0f} s", "dim", wrap=True)
-    terminal.finish(rows(cases, cycles, measured, changes))
+    terminal.finish(cycle_rows(cases, cycles, measured, changes))
     if pictures:
         from smc_mujoco.chattering.nyquist import nyquist
 

@@ -42,7 +42,7 @@ def table(
     return Tabular(headings=heads, rows=rows, title=f"chattering of {plant.name}", notes=notes)
 
 
-def rows(
+def cycle_rows(
     scenarios: Sequence[Scenario],
     cycles: Sequence[Chattering],
     measured: Sequence[Pair],

@@ -91,7 +91,7 @@ def nyquist(
                 right.set_title(words, loc="left", fontsize=size, fontweight="normal")
         title = f"Chattering: {wording.head(scenarios)}"
         pages.set_head(page, style.FULL_WIDTH, title, handles, shared)
-        return pages.write(page, pages.files(path))
+        return pages.write_page(page, pages.files(path))
 
 
 def plane(ax: Axes, scenario: Scenario, cycle: Chattering, channel: int, colour: str) -> None:

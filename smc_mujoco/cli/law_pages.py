@@ -16,14 +16,14 @@ from smc_mujoco.common.errors import unknown
 from smc_mujoco.common.tabular import of_fields
 from smc_mujoco.control import from_text
 from smc_mujoco.control.component import Template
-from smc_mujoco.control.estimator import catalogue as estimators
+from smc_mujoco.control.estimator import estimator_catalogue as estimators
 from smc_mujoco.control.law import Law, Measurement
-from smc_mujoco.control.law import catalogue as laws
-from smc_mujoco.control.law import joint_catalogue as joint_laws
+from smc_mujoco.control.law import joint_law_catalogue as joint_laws
+from smc_mujoco.control.law import law_catalogue as laws
 from smc_mujoco.control.properties import PROPERTIES, reads, suitable
-from smc_mujoco.control.surface import catalogue as surfaces
+from smc_mujoco.control.surface import surface_catalogue as surfaces
 from smc_mujoco.mechanisms.plant import Plant
-from smc_mujoco.mechanisms.plant import catalogue as plants
+from smc_mujoco.mechanisms.plant import plant_catalogue as plants
 
 CATALOGUES = {
     "Laws": laws,
@@ -56,7 +56,7 @@ def print_pages(name: str, console: Console) -> None:
         if name in templates:
             pages.append((templates[name], templates.package(name)))
     if not pages and "." in name:
-        for law in from_text.laws(name):
+        for law in from_text.laws_of_text(name):
             if isinstance(law, Law) and law.template:
                 pages.append((law.template, ""))
     if not pages:

@@ -147,8 +147,8 @@ def filmed(
     """
     from smc_mujoco.draw.film import film as video
 
-    if sentence := video.missing() or gl.note():
+    if sentence := video.missing_for_film() or gl.note():
         terminal.note(sentence, "yellow")
-    if video.missing():
+    if video.missing_for_film():
         return []
     return [video.film(runs, path, names, title, camera=camera)]

@@ -11,7 +11,7 @@ def module(name: str, what: str) -> ModuleType:
     """Return a module of the package; `what` needs it, as the error says if its annex is
     missing.
     """
-    if annex := missing(name):
+    if annex := missing_annex(name):
         from smc_mujoco.common.extras import MissingPackageError
 
         raise MissingPackageError(
@@ -20,7 +20,7 @@ def module(name: str, what: str) -> ModuleType:
     return importlib.import_module(name)
 
 
-def missing(name: str) -> str:
+def missing_annex(name: str) -> str:
     """Return the annex of a module of the package if it is not installed, else nothing."""
     annex = name.split(".")[1]
     return annex if annex in ANNEXES and not installed(annex) else ""

@@ -44,7 +44,7 @@ def package(name: str, what: str) -> Iterator[None]:
         raise MissingPackageError(f"{what} needs {name} ({error}): pip install {name}") from error
 
 
-def missing(name: str, what: str, *packages: str) -> str | None:
+def missing_extra(name: str, what: str, *packages: str) -> str | None:
     """Return None if packages of an extra are installed, else a sentence that says which are
     not.
     """

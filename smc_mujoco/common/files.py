@@ -213,15 +213,15 @@ def csv_rows(path: AnyPath) -> list[tuple[int, list[str]]]:
     return rows
 
 
-def plain(data: Any) -> Any:
+def plain_data(data: Any) -> Any:
     """Return the data with words for NaN and infinities.
 
     A text that is such a word gets a leading '.
     """
     if isinstance(data, Mapping):
-        return {name: plain(value) for name, value in data.items()}
+        return {name: plain_data(value) for name, value in data.items()}
     if isinstance(data, list | tuple):
-        return list(map(plain, data))
+        return list(map(plain_data, data))
     if isinstance(data, float) and not math.isfinite(data):
         if math.isnan(data):
             return "NaN"
@@ -246,7 +246,7 @@ def _restored(data: Any) -> Any:
 
 def to_json(data: Any, indent: int | None = None, sort_keys: bool = False) -> str:
     """Return the data as JSON, made `plain`."""
-    return json.dumps(plain(data), indent=indent, sort_keys=sort_keys, allow_nan=False)
+    return json.dumps(plain_data(data), indent=indent, sort_keys=sort_keys, allow_nan=False)
 
 
 def from_json(text: str) -> Any:

@@ -125,7 +125,7 @@ def note() -> str | None:
 
 
 @functools.cache
-def missing() -> str | None:
+def missing_renderer() -> str | None:
     """Return None if a child process can render pictures, else a sentence with the cure."""
     wish, backend = choice()
     if wish in OFF_VALUES:
@@ -176,7 +176,7 @@ def renderer(model: "mujoco.MjModel", height: int = 240, width: int = 320) -> "m
 
     from smc_mujoco.common.errors import ScenarioError
 
-    if why := missing():
+    if why := missing_renderer():
         raise ScenarioError(why)
     global _begun  # noqa: PLW0603
     if _forked:

@@ -11,7 +11,7 @@ from smc_mujoco.common import numba_internals as internals
 from smc_mujoco.common.rebuild import helpers
 
 
-def within(function: Any, size: int) -> bool:
+def constant_indices(function: Any, size: int) -> bool:
     """Return whether every index in a function, and in the compiled functions that it calls, is a
     constant of an array of this size.
     """
@@ -22,7 +22,7 @@ def within(function: Any, size: int) -> bool:
         for statement in block.body:
             if not all(-size <= index < size for index in _indices(code, statement)):
                 return False
-    return all(within(helper, size) for helper in helpers(function))
+    return all(constant_indices(helper, size) for helper in helpers(function))
 
 
 def _indices(code: Any, statement: Any) -> list[float]:

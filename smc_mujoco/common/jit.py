@@ -148,7 +148,7 @@ integers = _at(types.CPointer(types.int64))  # an address as a pointer to int64
 
 
 @intrinsic
-def place(typingctx, array):
+def address_of(typingctx, array):
     """Return the address that a pointer is."""
 
     def codegen(context, builder, signature, args):
@@ -340,7 +340,7 @@ class Key(NamedTuple):
     used: str  # a hash of all that it uses, see common/fingerprint.py
 
 
-def compiled(signature: Any, body: Callable, key: Key | None = None) -> Any:
+def compiled_cfunc(signature: Any, body: Callable, key: Key | None = None) -> Any:
     """Return numba's CFunc of a function.
 
     With a key it is loaded from the disk, or written there.
@@ -354,7 +354,7 @@ def compiled(signature: Any, body: Callable, key: Key | None = None) -> Any:
 
 
 def compile_for(dispatcher: Any, arguments: tuple[Any, ...], key: Key | None) -> None:
-    """Compile a function of numba's njit for the types of these arguments, as `compiled` does."""
+    """Compile a function of numba's njit for these types, as `compiled_cfunc` does."""
     if key is not None:
         dispatcher._cache = Cache(key)
     _in_thread(dispatcher.compile, tuple(map(typeof, arguments)))
@@ -546,7 +546,7 @@ def _complete(library: Any) -> bool:
 
 
 class CompiledFunction:
-    """A compiled C function, kept alive, and its `address`. For `key` see `compiled`.
+    """A compiled C function, kept alive, and its `address`. For `key` see `compiled_cfunc`.
 
     Whether it was `checked` for how it `differs` from its Python is of simulation/agreement.py.
     """
@@ -555,7 +555,7 @@ class CompiledFunction:
     differs = ""
 
     def __init__(self, body: Callable, key: Key | None = None):
-        self._cfunc = compiled(SIGNATURE, body, key)
+        self._cfunc = compiled_cfunc(SIGNATURE, body, key)
         self.address: int = self._cfunc.address  # pyright: ignore[reportAttributeAccessIssue] numba's own
 
 

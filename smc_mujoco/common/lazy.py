@@ -64,7 +64,7 @@ def lazy_module(package: str) -> LazyModule:
     def here(found: dict[str, str]) -> dict[str, str]:
         present = {}
         for name, module in found.items():
-            if not annexes.missing(module):
+            if not annexes.missing_annex(module):
                 present[name] = module
         return present
 

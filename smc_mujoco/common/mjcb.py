@@ -109,7 +109,7 @@ def no_clock() -> Any:
     return function
 
 
-def compiled(
+def compiled_spec(
     spec: mujoco.MjSpec, build: Callable[[mujoco.MjSpec], mujoco.MjModel] | None = None
 ) -> mujoco.MjModel:
     """Compile a spec; MuJoCo's warnings are shown if `build`, which compiles it, is a function of

@@ -231,7 +231,7 @@ def imported(kind: type[T], wanted: Callable[[T], bool]) -> Callable[[EntryPoint
     return make
 
 
-def source(point: EntryPoint) -> ModuleSpec:
+def module_spec(point: EntryPoint) -> ModuleSpec:
     """Return the spec of the module that an entry point names.
 
     It imports only the packages around the module.

@@ -92,7 +92,7 @@ def _defined(file: str, content: bytes) -> dict:
     return defined
 
 
-def place(thing: Any) -> str:
+def script_place(thing: Any) -> str:
     """Return FILE.py:NAME of a user's class or function, from this folder; "" if no file has it."""
     if id(thing) in _places:
         return _places[id(thing)][1]

@@ -91,7 +91,7 @@ class Tabular:
         return any(as_cell(cell).strong for cell in itertools.chain.from_iterable(self.rows))
 
     def __str__(self) -> str:
-        return plain(self)
+        return plain_text(self)
 
     def __rich_console__(
         self, console: "Console", options: "ConsoleOptions"
@@ -333,7 +333,7 @@ class Tables:
         return "\n".join(texts)
 
 
-def plain(shown: "RenderableType", width: int = PLAIN_WIDTH) -> str:
+def plain_text(shown: "RenderableType", width: int = PLAIN_WIDTH) -> str:
     """Return what rich prints, as text without colours."""
     from rich.console import Console
 

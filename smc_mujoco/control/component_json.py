@@ -27,21 +27,21 @@ def describe(c: Component) -> Fields:
     }
 
 
-def law(data: Data, source: Data | None) -> Component:
+def restored_law(data: Data, source: Data | None) -> Component:
     """Return the law that `describe` wrote, with the source of its gains: the user, if none is
     given.
     """
     if "each" in data:
-        component = by_channel([law(item, source) for item in data["each"]])
+        component = by_channel([restored_law(item, source) for item in data["each"]])
     else:
-        component = restore(data, "law", all_laws() | _laws_of_annex(data["module"]))
+        component = restored_component(data, "law", all_laws() | _laws_of_annex(data["module"]))
     if source is None:
         return component.sourced(sources.GIVEN)
-    restored = dataclasses.replace(sources.restore(source), gains=component.gains)
+    restored = dataclasses.replace(sources.restored_source(source), gains=component.gains)
     return dataclasses.replace(component, source=restored)
 
 
-def restore(data: Data, kind: str, known: Catalogue[Template]) -> Component:
+def restored_component(data: Data, kind: str, known: Catalogue[Template]) -> Component:
     """Return the component that `describe` wrote, without its function if that is not among the
     known ones.
 

@@ -46,7 +46,7 @@ def estimator_function(
 
 
 @functools.cache
-def catalogue() -> Catalogue[Template]:
+def estimator_catalogue() -> Catalogue[Template]:
     """Return every estimator of smc_mujoco.control.estimators and of other packages, by name."""
     return catalogue_of(
         "smc_mujoco.control.estimators",
@@ -69,4 +69,4 @@ def estimator(name: str, /, **gains: float) -> Estimator:
     Returns:
       An Estimator, for `velocity` of a Scenario.
     """
-    return find("velocity estimator", name, catalogue()).bind(gains, warn=True)
+    return find("velocity estimator", name, estimator_catalogue()).bind(gains, warn=True)

@@ -30,7 +30,7 @@ from smc_mujoco.control.component import Component, GainValue, Template
 from smc_mujoco.control.law import Law, all_laws
 from smc_mujoco.mechanisms.named import as_plant
 from smc_mujoco.mechanisms.plant import Plant
-from smc_mujoco.mechanisms.plant import catalogue as plants_known
+from smc_mujoco.mechanisms.plant import plant_catalogue as plants_known
 
 # pid(kp=50,ki=50,kd=8)
 NAME_AND_GAINS = re.compile(r"(?P<head>[^()]+?)\s*(?:\((?P<gains>.*)\))?", re.DOTALL)
@@ -88,7 +88,7 @@ def law(
         return _with_gains(text(), gains)
     if isinstance(text, Law) and text.kind == "law":
         return _with_gains(text, gains)
-    of_text = laws(text)
+    of_text = laws_of_text(text)
     if len(of_text) > 1:
         names = []
         for item in of_text:
@@ -107,14 +107,14 @@ def _shipped(text: object, plant: Plant, gains: Mapping[str, float | Sequence[fl
             f"law {shown(text)} is none of the library by its name: leave plant={plant.name!r} out"
         )
     head, gains_of_text = _parts("law", text, "pid(kp=50,ki=50,kd=8)")
-    shipped = gain_sets.law(plant, head)
+    shipped = gain_sets.law_with_gains(plant, head)
     warn_once(gain_sets.other_parameters_warning(plant))
     if not (gains_of_text or gains):
         return shipped
     return all_laws()[head].bind({**shipped.gains, **gains_of_text, **gains}, warn=True)
 
 
-def laws(text: object) -> list[str | Law]:
+def laws_of_text(text: object) -> list[str | Law]:
     """Return the laws of a text. The name of a law of the library stays a name, which sets of gains
     need.
     """
@@ -237,7 +237,7 @@ def _tuned(path: str) -> Law:
     """Return the law of a tuning, with its search as the source of the gains."""
     scenario = _described(path)
     with _reading(path):
-        tuned = component_json.law(scenario["law"], scenario["source"])
+        tuned = component_json.restored_law(scenario["law"], scenario["source"])
         of_library = scenario["plant"]["module"].startswith("smc_mujoco.mechanisms.plants.")
     if of_library:
         find(f"plant of {path}", scenario["plant"]["name"], plants_known())

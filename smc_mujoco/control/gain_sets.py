@@ -29,11 +29,11 @@ from smc_mujoco.common.errors import ScenarioError, find, shown
 from smc_mujoco.common.files import read_json
 from smc_mujoco.control import source
 from smc_mujoco.control.component import Component, gains_text
-from smc_mujoco.control.law import catalogue
-from smc_mujoco.control.law import law as find_law
+from smc_mujoco.control.law import law_catalogue
+from smc_mujoco.control.law import library_law as find_law
 from smc_mujoco.mechanisms.named import as_plant
 from smc_mujoco.mechanisms.plant import Plant
-from smc_mujoco.mechanisms.plant import catalogue as plants_known
+from smc_mujoco.mechanisms.plant import plant_catalogue as plants_known
 
 SETS = ("study", "tuned", "tracking")
 KNOWN_SETS: Mapping[str, None] = dict.fromkeys((*SETS, "default"))
@@ -81,7 +81,7 @@ STUDY: dict[str, dict[str, dict[str, float]]] = read_json(file_of("study"))
 
 
 @constrained
-def law(
+def law_with_gains(
     plant: str | Plant, name: str, gains: NameOfSet = "tuned", seed: int | None = None
 ) -> Component:
     """Return the law with its gains for a plant, from a set, without warnings of conditions that
@@ -144,7 +144,7 @@ def general() -> Names:
     """
     left_out = {"none", *ALIASES, *COMPARED}
     further = []
-    for name, template in catalogue().items():
+    for name, template in law_catalogue().items():
         if not template.plants and name not in left_out:
             further.append(name)
     return *COMPARED, *sorted(further)
@@ -170,7 +170,7 @@ def general_laws(plants: Sequence[str | Plant], gains: NameOfSet) -> list[str]:
 def in_set(plant: Plant, name: str, gains: str) -> bool:
     """Return whether a set of gains has some for a law on a plant."""
     try:
-        law(plant, name, gains)
+        law_with_gains(plant, name, gains)
     except ScenarioError:
         return False
     return True
@@ -245,7 +245,7 @@ def _stored(plant: str, name: str, gains: str) -> TunedGains | None:
     if (stored := _package_gains(gains).get((plant, name))) is not None:
         return stored
     files = []
-    if catalogue().package(name) and (template := catalogue().get(name)):
+    if law_catalogue().package(name) and (template := law_catalogue().get(name)):
         files.append(Path(inspect.getfile(template.function)))
     if plants_known().package(plant) and (known_plant := plants_known().get(plant)):
         files.append(known_plant.file)

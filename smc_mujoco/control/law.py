@@ -28,7 +28,7 @@ from smc_mujoco.control.component import FREE_BODY, Component, Options, Template
 from smc_mujoco.control.measurement import Measurement  # noqa: F401
 from smc_mujoco.mechanisms.named import as_plant
 from smc_mujoco.mechanisms.plant import Plant
-from smc_mujoco.mechanisms.plant import catalogue as plants_known
+from smc_mujoco.mechanisms.plant import plant_catalogue as plants_known
 
 Law = Component
 
@@ -188,7 +188,7 @@ def law_function(
 
 
 @functools.cache
-def catalogue() -> Catalogue[Template]:
+def law_catalogue() -> Catalogue[Template]:
     """Return every law of smc_mujoco.control.laws and of other packages, by name."""
     return catalogue_of(
         "smc_mujoco.control.laws",
@@ -199,7 +199,7 @@ def catalogue() -> Catalogue[Template]:
 
 
 @functools.cache
-def joint_catalogue() -> Catalogue[Template]:
+def joint_law_catalogue() -> Catalogue[Template]:
     """Return every law of smc_mujoco.control.joint_laws and of other packages, by name."""
     return catalogue_of(
         "smc_mujoco.control.joint_laws",
@@ -212,7 +212,7 @@ def joint_catalogue() -> Catalogue[Template]:
 @functools.cache
 def all_laws() -> Catalogue[Template]:
     """Return every law of one channel and of many joints, by name."""
-    return catalogue() | joint_catalogue()
+    return law_catalogue() | joint_law_catalogue()
 
 
 def checked_name(law: Law) -> Law:
@@ -239,7 +239,7 @@ def checked_name(law: Law) -> Law:
     )
 
 
-def law(name: str, /, **gains: float | Sequence[float]) -> Law:
+def library_law(name: str, /, **gains: float | Sequence[float]) -> Law:
     """Return the library's law `name` with these gains: one number for all channels, or one for
     each driven channel.
     """
@@ -273,10 +273,10 @@ def suits(law: Law | Template, plant: Plant) -> bool:
 
 
 KINDS = {  # of laws and of their parts -> the catalogue
-    "law": catalogue,
-    "joint": joint_catalogue,
-    "surface": surface.catalogue,
-    "estimator": estimator.catalogue,
+    "law": law_catalogue,
+    "joint": joint_law_catalogue,
+    "surface": surface.surface_catalogue,
+    "estimator": estimator.estimator_catalogue,
 }
 
 
@@ -307,7 +307,7 @@ def laws(plant: Plant | str | None = None, kind: str = "law") -> list[str]:
     if kind != "law":
         raise ScenarioError(f"laws of kind {kind!r} are not for single plants: leave plant out")
     plant = as_plant(plant)
-    candidates = all_laws() if plant.pose else catalogue()
+    candidates = all_laws() if plant.pose else law_catalogue()
     fully_driven = not plant.free and plant.pose != "heading"
     suited = []
     for name, law in candidates.items():

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 
 from smc_mujoco.common.errors import ScenarioError, items_of, shown
-from smc_mujoco.control.law import Law, law
+from smc_mujoco.control.law import Law, library_law
 from smc_mujoco.mechanisms.named import as_plant
 from smc_mujoco.mechanisms.plant import Plant
 
@@ -83,4 +83,4 @@ def lqr(plant: Plant | str, q: tuple[float, float] = (100.0, 16.0), r: float = 1
     a1, a2, b = linearised(as_plant(plant), "lqr")
     if len(weights := items_of("q", q)) != 2:
         raise ScenarioError(f"q is {shown(q)}: give two weights, of error and rate")
-    return law("lqr", q1=weights[0], q2=weights[1], r=r, a1=a1, a2=a2, b=b)
+    return library_law("lqr", q1=weights[0], q2=weights[1], r=r, a1=a1, a2=a2, b=b)

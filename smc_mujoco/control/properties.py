@@ -46,7 +46,7 @@ def read_by(function: Callable) -> frozenset[str]:
     return frozenset(_reads(function, 0, set()))
 
 
-def searched(law: Template) -> list[str]:
+def searched_gains(law: Template) -> list[str]:
     """Return the names of the gains that tuning searches: those that must be chosen for a plant."""
     return [name for name, gain in law.gains.items() if not gain.held]
 
@@ -58,9 +58,9 @@ PROPERTIES: Mapping[str, Property] = {
     "finite-time": Property(
         "bring the error to 0 in finite time", lambda law: law.finite_time == "e"
     ),
-    "one-gain": Property("have one gain to choose", lambda law: len(searched(law)) == 1),
+    "one-gain": Property("have one gain to choose", lambda law: len(searched_gains(law)) == 1),
     "two-gains": Property(
-        "have at most two gains to choose", lambda law: len(searched(law)) in (1, 2)
+        "have at most two gains to choose", lambda law: len(searched_gains(law)) in (1, 2)
     ),
 }
 

@@ -111,7 +111,7 @@ class Source:
         return {"kind": self.words, "search": self.search and dataclasses.asdict(self.search)}
 
 
-def restore(data: Data) -> Source:
+def restored_source(data: Data) -> Source:
     """Return the source that `Source.about` wrote, without its gains."""
     kind: str = data["kind"].removesuffix(MARK)
     search = data["search"] and GainSearch(**data["search"])

@@ -39,7 +39,7 @@ def surface_function(
 
 
 @functools.cache
-def catalogue() -> Catalogue[Template]:
+def surface_catalogue() -> Catalogue[Template]:
     """Return every surface of smc_mujoco.control.surfaces and of other packages, by name."""
     return catalogue_of(
         "smc_mujoco.control.surfaces",
@@ -59,4 +59,4 @@ def surface(name: str, /, **gains: float) -> Surface:
     Returns:
       A Surface, for `surface` of a Scenario.
     """
-    return find("surface", name, catalogue()).bind(gains, warn=True)
+    return find("surface", name, surface_catalogue()).bind(gains, warn=True)

@@ -123,7 +123,7 @@ def plot(
                 _name_row(row[0], dots.labels[plant], high)
         pages.set_head(page, width, head, key, shared)
         pages.space_ticks(page)
-        return pages.write(page, paths)
+        return pages.write_page(page, paths)
 
 
 def room_for_metrics(width: float, laws: int, conditions: Sequence[int]) -> int:

@@ -83,7 +83,7 @@ class DrawnRuns(NamedTuple):
     def of(cls, traces: Trace | Sequence[Trace], labels: Sequence[str] | None) -> "DrawnRuns":
         """Return traces of one plant, up to where they are finite, as they are drawn."""
         traces = shared_axes.traces_of_one_plant(traces)
-        names = wording.labels(traces, labels)
+        names = wording.run_names(traces, labels)
         scenarios = [trace.scenario for trace in traces]
         sources = [scenario.law.source for scenario in scenarios]
         entries = names
@@ -181,7 +181,7 @@ def figure(
     chosen = _chosen(runs.traces, panels, size, width)
     with style.page(width):
         page = _composed_page(runs, chosen, (width, height), title, fig)
-        return pages.write(page, paths)
+        return pages.write_page(page, paths)
 
 
 def _chosen(
@@ -530,7 +530,7 @@ def _rows(
     room = wide - 4.0 * size
     look = {"fontsize": size, "edgecolor": "none", "borderaxespad": 0.2, "borderpad": 0.0}
     look |= {"loc": "upper right", "frameon": True, "framealpha": 0.75}
-    rows = lanes.rows(frame, panel, runs.colours, share=share)
+    rows = lanes.run_lanes(frame, panel, runs.colours, share=share)
     for row, name in zip(rows, runs.names, strict=True):
         sample = pages.entry(".", row.colours[0])
         key = row.axes.legend(handles=[sample], handlelength=1.0, **look)
@@ -599,7 +599,7 @@ def _draw_beside(
 def _draw_ends(page: Figure | SubFigure, cell: SubplotSpec, panel: Panel, runs: DrawnRuns) -> None:
     """Draw a close-up of the end of u in a cell, each run in its row."""
     frame = page.add_subplot(cell, frameon=False, xticks=[])
-    rows = lanes.rows(frame, panel, runs.colours)
+    rows = lanes.run_lanes(frame, panel, runs.colours)
     largest = max(map(abs, span(panel.traces, "u")))
     for ax, part, colours in rows:
         drawing.last_samples(ax, part, colours, largest)

@@ -44,7 +44,7 @@ class Row(NamedTuple):
     colours: Sequence[str]
 
 
-def rows(
+def run_lanes(
     frame: Axes,
     panel: Panel,
     colours: Sequence[str],
@@ -82,7 +82,7 @@ def below_film(
         letters = style.points(float(style.RC["font.size"]))
         room = 72 * ax.get_window_extent().width / ax.figure.dpi
         beside = (lettering.width("smooth", letters) + 2.0) / room
-        drawn_rows = rows(ax, panel, colours, 1.0 - beside)
+        drawn_rows = run_lanes(ax, panel, colours, 1.0 - beside)
         for row in drawn_rows:
             row.axes.set(xlim=ax.get_xlim(), xticks=ax.get_xticks())
             row.axes.set_xticklabels(ax.get_xticklabels())

@@ -54,8 +54,8 @@ def show(
         frames = what
     else:
         frames = Frames(what, labels, title, size, fps, speed, camera)
-    if why := film.missing():
+    if why := film.missing_for_film():
         raise ScenarioError(why)
     with scratch() as folder:
-        path = film.write(frames, folder / "film.mp4")
+        path = film.write_film(frames, folder / "film.mp4")
         display(HTML(html.embedded(path.read_bytes(), "video/mp4", frames.size[0])))

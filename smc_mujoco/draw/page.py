@@ -301,7 +301,7 @@ def files(path: str | os.PathLike[str] | None, format: str | None = None) -> lis
     return [base.with_name(f"{base.name}.{ending}") for ending in endings]
 
 
-def write(page: Figure | SubFigure, paths: Sequence[Path]) -> Figure:
+def write_page(page: Figure | SubFigure, paths: Sequence[Path]) -> Figure:
     """Suit a figure that is drawn to a dark page, write it as `save` does, and return it."""
     dark.suit_page(page.findobj())
     return save(page, paths)

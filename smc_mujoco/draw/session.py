@@ -19,7 +19,7 @@ import numpy as np
 from smc_mujoco.common.aliases import Array, Fields
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.control.component import Template
-from smc_mujoco.control.gain_sets import law as law_with_gains
+from smc_mujoco.control.gain_sets import law_with_gains
 from smc_mujoco.control.law import Law, all_laws, laws, suits
 from smc_mujoco.mechanisms.hardware.friction import Coulomb
 from smc_mujoco.mechanisms.plant import Plant, compiled_for_runs

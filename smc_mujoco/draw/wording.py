@@ -11,7 +11,7 @@ from smc_mujoco.control import estimator as estimators
 from smc_mujoco.control import surface as surfaces
 from smc_mujoco.control.component import Component, Template
 from smc_mujoco.control.law import all_laws
-from smc_mujoco.mechanisms.plant import Plant, catalogue
+from smc_mujoco.mechanisms.plant import Plant, plant_catalogue
 from smc_mujoco.metrics.conventions import groups
 from smc_mujoco.metrics.once_per_trace import once_per_trace
 from smc_mujoco.simulation.conditions import CONDITION_FIELDS
@@ -42,7 +42,7 @@ def label(name: str) -> str:
     """Return the label of the library's law, surface or estimator of this name; other words
     unchanged.
     """
-    named_parts = surfaces.catalogue() | estimators.catalogue()
+    named_parts = surfaces.surface_catalogue() | estimators.estimator_catalogue()
     if name in all_laws():
         return law_name(name)
     return in_words(name) if name in named_parts else name
@@ -70,7 +70,7 @@ def in_words(name: str) -> str:
     return capital(name.replace("_", " "))
 
 
-def labels(traces: Sequence[Trace], own_labels: Sequence[str] | None) -> list[str]:
+def run_names(traces: Sequence[Trace], own_labels: Sequence[str] | None) -> list[str]:
     """Return one label per trace: the given ones, else the laws' labels, with what differs between
     runs of one law.
 
@@ -231,7 +231,7 @@ def plant_name(plant: Plant | str, short: bool = False) -> str:
     A user's model keeps the user's name.
     """
     if isinstance(plant, str):
-        library_plant = catalogue().get(plant)
+        library_plant = plant_catalogue().get(plant)
         return plant_name(library_plant, short) if library_plant else plant
     if short and plant.short:
         return plant.short

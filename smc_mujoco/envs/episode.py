@@ -20,7 +20,15 @@ import numpy as np
 from smc_mujoco.common.aliases import Array, ArrayPair
 from smc_mujoco.common.errors import ScenarioError, find, shown, unknown
 from smc_mujoco.control.law import FREE_BODY, law_function
-from smc_mujoco.envs.tasks import FLIGHT_TASKS, TASKS, Task, rest_position, reward, starts, tasks
+from smc_mujoco.envs.tasks import (
+    FLIGHT_TASKS,
+    TASKS,
+    Task,
+    rest_position,
+    reward,
+    start_range,
+    tasks,
+)
 from smc_mujoco.mechanisms.named import as_plant
 from smc_mujoco.mechanisms.plant import Plant, check_ranges
 from smc_mujoco.simulation import callback, coerce, state
@@ -94,7 +102,7 @@ class Setting:
                 "u_max is inf: give a finite one, because actions are fractions of it"
             )
         # bounds of the initial positions, (n,) each
-        self.low, self.high = starts(self.task, plant)
+        self.low, self.high = start_range(self.task, plant)
         if changes.get("x0") is not None:
             self.low = self.high = np.array(self.scenario.x0)
         self._compile(edit)
@@ -122,7 +130,7 @@ class Setting:
         """Compile the mechanism, and look up where its channels are."""
         spec = models.spec(self.scenario)
         edit(spec)
-        base = models.compiled(spec, self.scenario, models.USERDATA)
+        base = models.compiled_model(spec, self.scenario, models.USERDATA)
         self.model = models.with_values(base, self.scenario)
         self.activations = models.initial_activations(self.model, self.scenario)
         table = channels(self.model)

@@ -206,7 +206,7 @@ def tasks(plant: Plant | str) -> list[str]:
     return names
 
 
-def starts(task: Task, plant: Plant) -> ArrayPair:
+def start_range(task: Task, plant: Plant) -> ArrayPair:
     """Return the lowest and the highest start of a plant's channels, (n,) each, within its joints'
     ranges.
     """

@@ -112,7 +112,7 @@ def tuned(
     goal = objective(rig, starts)
     plant = _machines(rig)["set 1"]["plant"]
     candidates = []
-    for law in map(coerce.law, _chosen(rig, laws)):
+    for law in map(coerce.coerced_law, _chosen(rig, laws)):
         try:
             with warnings.catch_warnings():  # the remark says it
                 warnings.filterwarnings("ignore", "no set of gains tried", ScenarioWarning)
@@ -135,7 +135,7 @@ def tuned(
     return candidates
 
 
-def compare(
+def compare_on_ensemble(
     rig: Rig,
     laws: Sequence[str | Law] | None,
     seeds: int,

@@ -66,5 +66,5 @@ def excitation_figure(
         axes[-1, 1].set_xlabel("expected error (% of the number)")
         title = "What to record: expected errors of each motion, least first"
         pages.set_head(page, style.FULL_WIDTH, title, handles)
-        pages.write(page, paths)
+        pages.write_page(page, paths)
     return paths

@@ -78,7 +78,7 @@ def friction_figure(
         for ax, label in zip(axes[-1], ("time (s)", speed_label, speed_label), strict=True):
             ax.set_xlabel(label)
         pages.set_head(page, style.FULL_WIDTH, rig.label, handles)
-        pages.write(page, paths)
+        pages.write_page(page, paths)
     return paths
 
 

@@ -455,7 +455,7 @@ def identify(
         scatter = dict(zip(names, deviation.tolist(), strict=True))
     by_pieces = [] if replays.whole else fits_by_pieces(replays, slopes)
     predictions = fitted.predictions(data, states=states, **steps)
-    checked = None if held_out is None else check(fitted, held_out, columns, batches)
+    checked = None if held_out is None else held_out_fit(fitted, held_out, columns, batches)
     if batches is not None:
         batches.remove()
     return Identified(
@@ -485,7 +485,7 @@ def _expected_sets(twin: Rig, names: Sequence[str], most: int) -> int:
     return searches * min(most, USUAL_STEPS) * slopes
 
 
-def check(
+def held_out_fit(
     rig: Rig,
     log: Log,
     columns: Mapping[str, str] | None = None,
@@ -621,7 +621,7 @@ def _named_plant(text: str, logs: Sequence[Any], names: Sequence[str]) -> Plant:
     for joint in seen:
         if joint not in driven:
             joints.append(f"{joint}(measured)")
-    of_file = [joint.name for joint in mjcf.source(text).spec().joints if joint.name]
+    of_file = [joint.name for joint in mjcf.model_source(text).spec().joints if joint.name]
     for name in names if driven else ():
         joint = name.rpartition(".")[0]
         if joint in of_file and joint not in (*driven, *seen):

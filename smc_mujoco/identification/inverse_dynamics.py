@@ -92,7 +92,7 @@ def times(data: Record, columns: Columns) -> Array:
     return filtered.inner(data[columns.time][:: filtered.stride])
 
 
-def measured(data: Record, columns: Columns) -> Record:
+def measured_torque(data: Record, columns: Columns) -> Record:
     """Return the recorded torque of each joint, below CUTOFF, N m."""
     filtered = Filter(data, columns)
     torque_columns = {}

@@ -11,7 +11,7 @@ import numpy as np
 
 from smc_mujoco.common.errors import ScenarioError, ScenarioWarning, users_stacklevel
 from smc_mujoco.common.files import write_text
-from smc_mujoco.common.mjcb import compiled
+from smc_mujoco.common.mjcb import compiled_spec
 from smc_mujoco.common.text import joined
 from smc_mujoco.identification.log_rig import LogRig
 from smc_mujoco.identification.paths import SERVO
@@ -61,7 +61,7 @@ def save_model(rig: LogRig, path: Path) -> Path:
 def _mjcf(rig: LogRig, source: Any, path: Path, left_out: list[str]) -> str:
     """Return the MJCF with a rig's numbers. What cannot be written is added to `left_out`."""
     spec = source.spec()
-    model = compiled(spec.copy())
+    model = compiled_spec(spec.copy())
     values = rig.values
     for name, value in values.items():
         owner, _, kind = name.rpartition(".")
@@ -77,8 +77,8 @@ def _mjcf(rig: LogRig, source: Any, path: Path, left_out: list[str]) -> str:
             left_out.append(name)
     if source.path:
         folder = Path(source.path).parent
-        _find_files(spec, folder, path.parent, urdf.read(Path(source.path)))
-    compiled(spec)  # MuJoCo writes what it has compiled
+        _find_files(spec, folder, path.parent, urdf.read_urdf(Path(source.path)))
+    compiled_spec(spec)  # MuJoCo writes what it has compiled
     return full_precision_xml(spec)
 
 
@@ -153,7 +153,7 @@ def _find_files(spec: mujoco.MjSpec, folder: Path, out: Path, read: urdf.Urdf | 
 def _urdf(rig: LogRig, source: Any, path: Path, left_out: list[str]) -> str:
     """Return the URDF with the damping and friction of its joints."""
     del path
-    if not source.path or urdf.read(Path(source.path)) is None:
+    if not source.path or urdf.read_urdf(Path(source.path)) is None:
         raise ScenarioError(f"the model of {rig.name} is no URDF: save FILE.xml")
     tree = ET.parse(source.path)  # the user's own file
     joints = {joint.get("name"): joint for joint in tree.getroot().iter("joint")}

@@ -63,7 +63,7 @@ def pairs_figure(
         ax.set_ylabel("torque (N·m or N)")
         ax.set_title(title)
         pages.set_head(page, style.FULL_WIDTH, "Friction from speed and torque", handles)
-        pages.write(page, paths)
+        pages.write_page(page, paths)
     return paths
 
 

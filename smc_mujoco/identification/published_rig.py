@@ -258,7 +258,7 @@ class PublishedRig(Rig):
 
 
 @functools.cache
-def catalogue() -> Catalogue[PublishedRig]:
+def rig_catalogue() -> Catalogue[PublishedRig]:
     """Return every rig of smc_mujoco.evidence.rigs.machines and of other packages, by name."""
     machines = {}
     if annexes.installed("evidence"):
@@ -278,7 +278,7 @@ def rig(name: str, **values: float) -> PublishedRig:
     Raises:
       ScenarioError: an unknown rig or quantity, or a value out of its range.
     """
-    return find("rig", name, catalogue()).with_values(values)
+    return find("rig", name, rig_catalogue()).with_values(values)
 
 
 def rigs() -> list[str]:
@@ -289,4 +289,4 @@ def rigs() -> list[str]:
     Returns:
       Names, in alphabetical order.
     """
-    return list(catalogue())
+    return list(rig_catalogue())

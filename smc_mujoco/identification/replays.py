@@ -421,7 +421,7 @@ class Replays:
     ) -> Iterator[bytes]:
         """Yield all that a batch of replays depends on."""
         first = self.twin.repeated(self._part(0), state=self.state(points[0], 0), **fields)
-        yield run_key.key(first).encode()
+        yield run_key.run_key(first).encode()
         for k, piece in enumerate(self.pieces):
             yield repr((piece.record, piece.skipped, piece.stride, [*piece.measured])).encode()
             for values in piece.measured.values():
@@ -521,7 +521,7 @@ class Replays:
         twin = self.twin
         data = self.twin.checked(self.data[i])
         if twin.dynamics is not None:
-            measured = inverse_dynamics.measured(data, twin.columns)
+            measured = inverse_dynamics.measured_torque(data, twin.columns)
             spread = {}
             for name, values in measured.items():
                 spread[name] = _norm(values)

@@ -67,7 +67,7 @@ def residual_figure(
         for ax in axes[-1]:
             ax.set_xlabel("time (s)")
         pages.set_head(page, style.FULL_WIDTH, title, handles)
-        pages.write(page, paths)
+        pages.write_page(page, paths)
     return paths
 
 

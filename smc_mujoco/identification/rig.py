@@ -400,7 +400,7 @@ class Rig:
         if self.dynamics is not None:
             plant = self.dynamics(Values(**self.values))
             for columns in data:
-                measured = inverse_dynamics.measured(columns, names)
+                measured = inverse_dynamics.measured_torque(columns, names)
                 torques = inverse_dynamics.torques(plant, columns, names)
                 predictions.append((torques, measured, inverse_dynamics.times(columns, names)))
             return predictions

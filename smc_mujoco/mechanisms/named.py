@@ -112,7 +112,7 @@ def from_text(text: str, folder: Path = Path(), **values: Any) -> Plant:
         values = {"pose": _pose(start.strip())} | values
     elif start is not None:
         values = {"keyframe": start.strip() or None} | values
-    source = mjcf.source(folder / path)
+    source = mjcf.model_source(folder / path)
     if channels:  # without one, an error names the joints
         named = [(name, channel or Channel()) for name, channel in channels.items()]
         values = _left_out(source, [*joints_of(tuple(named)), *measured], values) | values

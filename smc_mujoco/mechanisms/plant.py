@@ -26,7 +26,7 @@ from smc_mujoco.common.data import keyword_dataclass
 from smc_mujoco.common.errors import MAX_ITEMS, ScenarioError, find, shown, unknown, whole
 from smc_mujoco.common.files import shipped
 from smc_mujoco.common.frozen import frozen
-from smc_mujoco.common.mjcb import compiled
+from smc_mujoco.common.mjcb import compiled_spec
 from smc_mujoco.common.registry import Catalogue, catalogue_of
 from smc_mujoco.mechanisms import rotation
 
@@ -330,7 +330,7 @@ class Plant:
         numbers = whole("nuserdata", nuserdata, 0, MAX_ITEMS)
         model = compiled_for_runs(spec or self.spec(), numbers)
         values = self.values(factors or {})
-        write(model, self.fields(model, values))
+        write_fields(model, self.fields(model, values))
         mujoco.mj_setConst(model, mujoco.MjData(model))
         return model
 
@@ -401,7 +401,7 @@ def compiled_for_runs(spec: mujoco.MjSpec, nuserdata: int) -> mujoco.MjModel:
     spec.nuserdata = nuserdata
     # otherwise MuJoCo would reset a diverging run to the initial state and continue
     spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET.value
-    return compiled(spec)
+    return compiled_spec(spec)
 
 
 def leave_out_scenery(spec: mujoco.MjSpec) -> None:
@@ -411,7 +411,7 @@ def leave_out_scenery(spec: mujoco.MjSpec) -> None:
     spec.compiler.discardvisual = spec.compiler.inertiafromgeom != OF_GEOMS
 
 
-def write(model: mujoco.MjModel, fields: Iterator[Field]) -> None:
+def write_fields(model: mujoco.MjModel, fields: Iterator[Field]) -> None:
     """Write fields into a model."""
     for name, place, value, adds in fields:
         values = field_array(model, name)
@@ -464,7 +464,7 @@ def model_spec(name: str) -> mujoco.MjSpec:
 
 
 @functools.cache
-def catalogue() -> Catalogue[Plant]:
+def plant_catalogue() -> Catalogue[Plant]:
     """Return every plant of smc_mujoco.mechanisms.plants and of other packages, by name."""
     return catalogue_of("smc_mujoco.mechanisms.plants", Plant, "smc_mujoco.plants")
 
@@ -485,7 +485,7 @@ def plant(name: str, *, set: Any = None, **parameters: float) -> Plant:
         raise ScenarioError(
             f"plant is {shown(name)}: a model of your own is smc.plant_from(file, [joints])"
         )
-    base = find("plant", name, catalogue())
+    base = find("plant", name, plant_catalogue())
     size = parameters.pop("n", base.n)
     n = whole(f"n of {name}", size, *base.sizes)
     values = dict(base.parameters)
@@ -513,4 +513,4 @@ def plants() -> list[str]:
     Returns:
       Names, in alphabetical order.
     """
-    return list(catalogue())
+    return list(plant_catalogue())

@@ -119,7 +119,7 @@ def _enter_tracking(
     target = tracking_results.enter_tracking(text, suite, results, threads, True, executor)
     board = tracking_results.tracking_board(suite, results)
     entry = tracking_results.read_result(target).name
-    page = tracking_page.write(board, target.parent / "board.md", entry)
+    page = tracking_page.write_board(board, target.parent / "board.md", entry)
     for line in screen_lines(board.standing(entry)):
         terminal.note(line)
     terminal.wrote(page)
@@ -129,7 +129,7 @@ def _write_site(results: Path, terminal: Terminal) -> None:
     """Write the pages of all results."""
     from smc_mujoco.problems import pages
 
-    page, left_out = pages.build(results, results / "site")
+    page, left_out = pages.build_pages(results, results / "site")
     for why in left_out:
         terminal.note(f"left out: {printable(why)}", wrap=True)
     terminal.wrote(page)

@@ -58,7 +58,7 @@ def enter(
       ScenarioError: a folder that is no entry; or, to verify, a result that is not what the entry
         gives.
     """
-    entry = entries.read(folder)
+    entry = entries.read_entry(folder)
     problems = suite.suite(name)
     count = instances or problem(problems[0]).visible
     target = Path(out) / suite.folder(name, seed) / slug(entry.name)
@@ -132,7 +132,7 @@ def run(
 
     Return how runs failed, and the law's time a sample, see `law_time`.
     """
-    entry = entries.read(folder)
+    entry = entries.read_entry(folder)
     files = sorted(filter(Path.is_file, Path(folder).glob("*")))
     beside = []
     for path in files:
@@ -141,7 +141,9 @@ def run(
     failures = list[str]()
 
     def made(one: Problem) -> tuple[list[entry_runs.Row], list[str]]:
-        return entry_runs.rows(one, one.scenarios(entry.law(one.plant), instances, seed), instances)
+        return entry_runs.instance_rows(
+            one, one.scenarios(entry.law(one.plant), instances, seed), instances
+        )
 
     def groups() -> Iterator[list[entry_runs.Row]]:
         for name in problems:
@@ -155,7 +157,7 @@ def run(
             failures.extend(failed)
             yield rows
 
-    entry_runs.write(table, groups())
+    entry_runs.write_rows(table, groups())
     first = problem(problems[0])
     (scenario,) = first.scenarios(entry.law(first.plant), [0])
     time = law_time(scenario)

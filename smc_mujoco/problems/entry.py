@@ -87,7 +87,7 @@ class Entry:
         return fields
 
 
-def read(folder: AnyPath) -> Entry:
+def read_entry(folder: AnyPath) -> Entry:
     """Return the entry in a folder, without running its code; or that of a law of the library.
 
     Raises:

@@ -29,7 +29,7 @@ for measure in MEASURES:
 Row = dict[str, Any]
 
 
-def rows(
+def instance_rows(
     one: Problem, scenarios: Sequence[Scenario], instances: Sequence[int]
 ) -> tuple[list[Row], list[str]]:
     """Run the scenarios of a problem's instances. Return their rows, and how runs failed."""
@@ -43,7 +43,7 @@ def rows(
     return table, failures
 
 
-def write(path: Path, groups: Iterable[list[Row]]) -> None:
+def write_rows(path: Path, groups: Iterable[list[Row]]) -> None:
     """Write the rows of each problem as they come."""
     import pyarrow as pa
 
@@ -55,7 +55,7 @@ def write(path: Path, groups: Iterable[list[Row]]) -> None:
         for group in groups:
             yield pa.Table.from_pylist([never | row for row in group], schema=schema)
 
-    tables.write(path, schema, parts())
+    tables.write_table(path, schema, parts())
 
 
 class EntryRuns:

@@ -29,7 +29,7 @@ ASKS = {
 SHOWN = 5  # best and worst problems on an entry's page
 
 
-def build(results: Path, out: Path) -> tuple[Path, list[str]]:
+def build_pages(results: Path, out: Path) -> tuple[Path, list[str]]:
     """Write the pages of all results in a folder.
 
     Return the first page, and why results are left out.

@@ -175,7 +175,7 @@ class Problem:
         """Return the scenario before anything is drawn."""
         if isinstance(law, str) and law in all_laws():
             shipped = gain_sets.in_set(find_plant(self.plant), law, "tuned")
-            law = gain_sets.law(self.plant, law, "tuned" if shipped else "default")
+            law = gain_sets.law_with_gains(self.plant, law, "tuned" if shipped else "default")
         changes = {"u_max": self.u_max, "control_period": self._values["control_period"]}
         condition = self.condition
         if self._attacked:

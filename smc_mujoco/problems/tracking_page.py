@@ -15,7 +15,7 @@ from smc_mujoco.common.text import capital, joined, number
 from smc_mujoco.control.component import bounded, gains_text
 from smc_mujoco.problems.tracking import tracking_suites
 from smc_mujoco.problems.tracking_entry import beside_of
-from smc_mujoco.problems.tracking_picture import draw, shown
+from smc_mujoco.problems.tracking_picture import draw_board, entries_drawn
 from smc_mujoco.problems.tracking_results import (
     FLOOR,
     ProblemBoard,
@@ -48,7 +48,7 @@ def page(board: TrackingBoard, picture: str, own: str = "") -> str:
     lines = [
         f"# {TITLES[load]}",
         "",
-        summary(board),
+        standings_line(board),
         "",
         f"![Error of each entry over the least of its problem]({picture})",
         "",
@@ -99,7 +99,7 @@ def page(board: TrackingBoard, picture: str, own: str = "") -> str:
 
 def _left_out(board: TrackingBoard, own: str) -> str:
     """Return how many entries the picture leaves out, in words; "" if none."""
-    count = len(board.entries) - len(shown(board, own))
+    count = len(board.entries) - len(entries_drawn(board, own))
     return f" {count} more have larger errors." if count else ""
 
 
@@ -125,7 +125,7 @@ def _date(board: TrackingBoard) -> str:
     return max(entry.date for entry in board.entries.values())
 
 
-def summary(board: TrackingBoard) -> str:
+def standings_line(board: TrackingBoard) -> str:
     """Return the first line: who stands where."""
     first, led = first_entries(board)
     names = joined(f"`{name}`" for name in first)
@@ -210,10 +210,10 @@ def tag_table(board: TrackingBoard) -> Iterator[str]:
         yield f"| {tag}: {value} | {len(names)} | {problems} | {number(float(typical))} |"
 
 
-def write(board: TrackingBoard, path: Path, own: str = "") -> Path:
+def write_board(board: TrackingBoard, path: Path, own: str = "") -> Path:
     """Write the page and its picture beside it, both with the entry `own`. Return the page."""
     picture = path.with_suffix(".svg")
-    draw(board, picture, own)
+    draw_board(board, picture, own)
     return write_text(path, page(board, picture.name, own))
 
 
@@ -222,7 +222,7 @@ def main(arguments: Sequence[str]) -> None:
     (folder,) = arguments
     for suite in tracking_suites():
         board = tracking_board(suite)
-        write(board, Path(folder, page_name(board)))
+        write_board(board, Path(folder, page_name(board)))
 
 
 if __name__ == "__main__":

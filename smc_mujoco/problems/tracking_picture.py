@@ -25,7 +25,7 @@ def means(board: TrackingBoard) -> dict[str, float]:
     return dict(sorted(typical.items(), key=lambda pair: pair[1]))
 
 
-def shown(board: TrackingBoard, own: str) -> list[str]:
+def entries_drawn(board: TrackingBoard, own: str) -> list[str]:
     """Return the entries in the picture, `own` among them, those with the least mean first."""
     typical = means(board)
     leading = {own, *(entry for result in board.problems for entry in result.leaders)}
@@ -33,11 +33,11 @@ def shown(board: TrackingBoard, own: str) -> list[str]:
     return sorted(in_order[:ROWS], key=lambda entry: typical[entry])
 
 
-def draw(board: TrackingBoard, path: Path, own: str = "") -> None:
+def draw_board(board: TrackingBoard, path: Path, own: str = "") -> None:
     """Draw the picture as SVG: in colour the entries that no other leads in some problem."""
     errors = relative_errors(board)
     typical = means(board)
-    rows = shown(board, own)
+    rows = entries_drawn(board, own)
     count = len(board.problems)
     with style.page(WIDTH):
         import matplotlib.pyplot as plt

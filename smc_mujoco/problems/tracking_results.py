@@ -33,7 +33,7 @@ from smc_mujoco.common.progress import bar
 from smc_mujoco.common.tabular import Cell, Tabular
 from smc_mujoco.common.text import number
 from smc_mujoco.common.version import versions
-from smc_mujoco.control.law import law
+from smc_mujoco.control.law import library_law
 from smc_mujoco.problems.tracking import (
     TrackingProblem,
     TrackingSuite,
@@ -324,11 +324,13 @@ def bounds(problem: TrackingProblem) -> tuple[float, float]:
     knows = {"model": "true", "sensor": None, "noise": None, "velocity": None, "input_delay": 0.0}
     runs = []
     for instance in range(FIRST_UNSEEN, FIRST_UNSEEN + BOUNDING):
-        still = problem.scenario(law("none"), filtered_difference(problem.period), None, instance)
+        still = problem.scenario(
+            library_law("none"), filtered_difference(problem.period), None, instance
+        )
         runs.append(still)
         for speed in ORACLE_SPEEDS:
             wc = speed / scales["T"]
-            oracle = law("pid", kp=wc**2, kd=2.0 * wc, ki=0.0, tau=0.0)
+            oracle = library_law("pid", kp=wc**2, kd=2.0 * wc, ki=0.0, tau=0.0)
             runs.append(dataclasses.replace(still, law=oracle, **knows))
     errors = []
     for trace in run(runs):

@@ -205,7 +205,7 @@ class Margins(Answer, list[Margin]):
             if margin.theory is not None and not math.isnan(margin.value):
                 limit = margin.theory if margin.theory < math.inf else math.nan
             bars.append(margins_figure.MarginBar(*about, margin.value, margin.resolution, limit))
-        return margins_figure.draw(bars, path, **options)
+        return margins_figure.draw_margins(bars, path, **options)
 
 
 @constrained
@@ -291,7 +291,7 @@ def _other_sets(base: Scenario, law: object, gains: str) -> list[Scenario]:
     count = len(sets.tuned(base.plant, base.law.name, gains).sets)
     scenarios = []
     for seed in range(1, count):
-        of_set = sets.law(base.plant, base.law.name, gains, seed)
+        of_set = sets.law_with_gains(base.plant, base.law.name, gains, seed)
         scenarios.append(dataclasses.replace(base, law=of_set).named(base.condition))
     return scenarios
 

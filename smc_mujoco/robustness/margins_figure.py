@@ -52,7 +52,7 @@ class MarginBar(NamedTuple):
         return f"{'' if self.resolution else '≥ '}{number(factor * self.value)}"
 
 
-def draw(
+def draw_margins(
     found: Sequence[MarginBar],
     path: str | os.PathLike[str] | None = None,
     title: str | None = None,
@@ -86,7 +86,7 @@ def draw(
                 ax.set_axis_off()
         pages.set_head(page, width, head, key)
         pages.space_ticks(page)
-        return pages.write(page, paths)
+        return pages.write_page(page, paths)
 
 
 def _most_laws(found: Sequence[MarginBar]) -> int:

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from smc_mujoco.common.errors import ScenarioError
-from smc_mujoco.control.source import restore
+from smc_mujoco.control.source import restored_source
 from smc_mujoco.draw import colouring, dark, style, wording
 from smc_mujoco.draw import page as pages
 from smc_mujoco.robustness.region_of_attraction import CONVERGES, DOES_NOT, Basin
@@ -23,7 +23,7 @@ LIGHTEST = 82.0  # lightness of the latest shade in CIELAB
 MAP_SIZE = (4.4, 5.0)  # inches on a full page, width and height of a map
 
 
-def draw(maps: Sequence[Basin], path: str | os.PathLike[str] | None = None) -> Figure:
+def draw_regions(maps: Sequence[Basin], path: str | os.PathLike[str] | None = None) -> Figure:
     """Draw maps side by side; `path` is as in `figure`."""
     paths = pages.files(path)
     if not maps:
@@ -38,7 +38,7 @@ def draw(maps: Sequence[Basin], path: str | os.PathLike[str] | None = None) -> F
         plants = list(dict.fromkeys(region.plant for region in maps))
         sources = []
         for region in maps:
-            sources.append([restore({"kind": region.source, "search": None})])
+            sources.append([restored_source({"kind": region.source, "search": None})])
         words, gains = pages.gain_sources(sources)
         for ax, region, source in zip(axes, maps, words, strict=True):
             name = wording.law_name(region.law)
@@ -46,7 +46,7 @@ def draw(maps: Sequence[Basin], path: str | os.PathLike[str] | None = None) -> F
                 name += f", {wording.plant_name(region.plant, short=True)}"
             draw_map(ax, region, after, name + source.replace(", ", "\n"))
         pages.set_head(page, width, wording.heading(plants, short=len(plants) > 1), [rest], gains)
-        return pages.write(page, paths)
+        return pages.write_page(page, paths)
 
 
 def draw_map(ax: Axes, region: Basin, after: Sequence[float], title: str) -> None:

@@ -214,9 +214,9 @@ class Sensitivity(Answer, SobolResult):
         """Draw the indices, and the runs over the two axes that tell most; arguments as in
         `smc.figure`.
         """
-        from smc_mujoco.robustness.sensitivity_figure import draw
+        from smc_mujoco.robustness.sensitivity_figure import draw_sensitivity
 
-        return draw(self, path, **options)
+        return draw_sensitivity(self, path, **options)
 
     plot = figure
 

@@ -27,7 +27,7 @@ TONES = 12  # of runs, from the best score to the worst
 LIGHTEST = 80.0  # lightness of the best in CIELAB: chosen
 
 
-def draw(
+def draw_sensitivity(
     found: SobolResult,
     path: str | os.PathLike[str] | None = None,
     title: str | None = None,
@@ -65,7 +65,7 @@ def draw(
         pages.set_head(page, width, head, handles)
         if found.checked:
             page.supxlabel(found.checked, wrap=True, color=style.MUTED, size="small")
-        return pages.write(page, paths)
+        return pages.write_page(page, paths)
 
 
 def _bars(ax: Axes, found: SobolResult, colour: str, pale: str) -> None:

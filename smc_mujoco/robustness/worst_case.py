@@ -430,7 +430,7 @@ def cached_worst_case(
 
     return cached(
         path,
-        [run_key.key(scenario), dataclasses.asdict(within), budget],
+        [run_key.run_key(scenario), dataclasses.asdict(within), budget],
         lambda: worst_case(
             scenario, METRIC, within, budget, threads=threads, progress=progress, device=device
         ),

@@ -30,7 +30,7 @@ from numba import njit, types
 
 from smc_mujoco.common import fingerprint, mjcb
 from smc_mujoco.common.errors import ScenarioError, ScenarioWarning, users_stacklevel
-from smc_mujoco.common.jit import Key, compiled, integers, pointer
+from smc_mujoco.common.jit import Key, compiled_cfunc, integers, pointer
 from smc_mujoco.simulation.controller import Arrays
 from smc_mujoco.simulation.controller import control as run_simulation
 from smc_mujoco.simulation.model import USERDATA
@@ -185,7 +185,7 @@ def callback():
         run_simulation(address, simulation_at(address, 0), arrays)
 
     key = Key("control", fingerprint.now(control))
-    return compiled(types.void(types.intp, types.intp), control, key)
+    return compiled_cfunc(types.void(types.intp, types.intp), control, key)
 
 
 @functools.cache
@@ -198,7 +198,7 @@ def silence():
         return
 
     signature = types.void(types.intp)
-    return compiled(signature, silent, Key("silent", ""))
+    return compiled_cfunc(signature, silent, Key("silent", ""))
 
 
 @contextlib.contextmanager

@@ -18,9 +18,9 @@ from smc_mujoco.common.errors import ScenarioError, items_of, number, shown, unk
 from smc_mujoco.common.text import counted, joined, stated
 from smc_mujoco.control import from_text, gain_sets
 from smc_mujoco.control.component import Component, Template, by_channel
-from smc_mujoco.control.estimator import catalogue as estimators
+from smc_mujoco.control.estimator import estimator_catalogue as estimators
 from smc_mujoco.control.law import Law
-from smc_mujoco.control.surface import catalogue as surfaces
+from smc_mujoco.control.surface import surface_catalogue as surfaces
 from smc_mujoco.mechanisms.custom.model_numbers import dotted, model_numbers, with_model_numbers
 from smc_mujoco.mechanisms.hardware.contact import Contact, Obstacle, kinds
 from smc_mujoco.mechanisms.hardware.encoder import Encoder
@@ -78,13 +78,13 @@ def plant(name: str, value: object, s: Any) -> Plant:
     return with_model_numbers(machine, changed)
 
 
-def law(value: Law | Template | str) -> Law:
+def coerced_law(value: Law | Template | str) -> Law:
     """Return a law, from itself, its template or its text."""
     law = from_text.law(value) if isinstance(value, str) else value
     return _component("law", law)
 
 
-def laws(name: str, value: Laws | None, s: Any) -> Law:
+def coerced_laws(name: str, value: Laws | None, s: Any) -> Law:
     """Return the law of a plant's driven channels, from one law, one for each channel, or None for
     the suggested.
     """
@@ -103,21 +103,21 @@ def _of_plant(value: Any, s: Any) -> Law:
     are some and the scenario has the model, the surface and the goal for which they were tuned;
     else its defaults, with a warning.
     """
-    chosen = law(value)
+    chosen = coerced_law(value)
     if value != chosen.name or not chosen.gains:
         return chosen
     model = "nominal" if chosen.requires_model else "none"
     as_tuned = s.model in (None, model) and s.surface is None and s.tracks == "position"
     if as_tuned and gain_sets.in_set(s.plant, chosen.name, "tuned"):
         warn_once(gain_sets.other_parameters_warning(s.plant))
-        return gain_sets.law(s.plant, chosen.name)
+        return gain_sets.law_with_gains(s.plant, chosen.name)
     # defaults of a law of many joints are rates, which hold for any machine
     if not (chosen.plants or chosen.joint):
         warn_once(gain_sets.default_gains_warning(s.plant, chosen))
     return chosen
 
 
-def surface(name: str, value: object, s: Any) -> Any:
+def coerced_surface(name: str, value: object, s: Any) -> Any:
     """Return a surface, from itself, its template or its text, as "linear(c=3)"."""
     if isinstance(value, str):
         return from_text.component(name, value, surfaces(), "linear(c=3)")

@@ -16,10 +16,10 @@ from smc_mujoco.common import errors
 from smc_mujoco.common.aliases import Data
 from smc_mujoco.common.errors import ScenarioError, find, shown
 from smc_mujoco.common.registry import subclasses
-from smc_mujoco.common.scripts import IN_FILE, WITHIN, object_named, place
+from smc_mujoco.common.scripts import IN_FILE, WITHIN, object_named, script_place
 from smc_mujoco.common.text import stated
 from smc_mujoco.control.component import Component, Template
-from smc_mujoco.control.estimator import catalogue as estimators
+from smc_mujoco.control.estimator import estimator_catalogue as estimators
 from smc_mujoco.mechanisms.hardware import obstacles, servos  # noqa: F401
 from smc_mujoco.mechanisms.hardware.contact import Obstacle
 from smc_mujoco.mechanisms.hardware.part import Actuator, Friction, Part
@@ -185,5 +185,5 @@ def value_text(value: Any, files: bool = True, brief: bool = False) -> str:
 
 def _word(kind: Any, own: bool) -> str:
     """Return FILE.py:NAME of a kind of part that is the user's own; "" if no file has it."""
-    where = place(kind) if own else ""
+    where = script_place(kind) if own else ""
     return where if WITHIN.fullmatch(where) else where and repr(where)

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from smc_mujoco.common.text import joined
-from smc_mujoco.control.law import catalogue
+from smc_mujoco.control.law import law_catalogue
 from smc_mujoco.control.source import DEFAULT
 from smc_mujoco.mechanisms.hardware.friction import LuGre
 from smc_mujoco.mechanisms.hardware.joint_force import of_joint
@@ -209,7 +209,7 @@ def of_default_gains(s: Any) -> str:
     """
     if not any(part.is_of_file and part.unit for part in s.actuator):
         return ""
-    library = catalogue()
+    library = law_catalogue()
     for law in s.law.parts:
         if law.name in library and law.gains and law.source.kind == DEFAULT:
             return (

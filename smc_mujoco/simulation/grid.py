@@ -426,7 +426,7 @@ def check_names(
         if isinstance(law, str):
             of_laws.append((law, law, law))
         else:
-            bound = coerce.law(law)
+            bound = coerce.coerced_law(law)
             of_laws.append((bound.name, bound, bound))
     of_conditions = [(condition.name, condition, str(condition)) for condition in conditions]
     # each thing with its name and what distinguishes it from others
@@ -450,9 +450,9 @@ def check_names(
 def _law(plant: Plant, law: str | Law | Template, gains: str, seed: int) -> Component:
     """Return a law, or the law of a name with its gains for the plant."""
     if not isinstance(law, str) or law not in all_laws():
-        return checked_name(coerce.law(law))
+        return checked_name(coerce.coerced_law(law))
     gains = "default" if law == "none" else gains
-    with_gains = sets.law(plant, law, gains, seed)
+    with_gains = sets.law_with_gains(plant, law, gains, seed)
     if gains != "default" and (doubt := sets.other_parameters_warning(plant, gains)):
         warnings.warn(doubt, ScenarioWarning, users_stacklevel())
     return with_gains
@@ -465,7 +465,7 @@ def listed_laws(laws: object) -> list[str | Law | Template]:
     """
     components = []
     for value in listed("laws", laws):
-        components += from_text.laws(value) if isinstance(value, str) else [value]
+        components += from_text.laws_of_text(value) if isinstance(value, str) else [value]
     return components
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from smc_mujoco.common.errors import ScenarioError, shown
 from smc_mujoco.common.text import joined
 from smc_mujoco.control.component import Component, Template, gain_text
-from smc_mujoco.control.law import Law, joint_catalogue, suits
+from smc_mujoco.control.law import Law, joint_law_catalogue, suits
 from smc_mujoco.control.properties import reads
 from smc_mujoco.control.surface import Surface
 from smc_mujoco.control.written import StateFeedback
@@ -109,7 +109,7 @@ def check_channels(s: Any) -> None:
             f"drives {driven}, where {plant.name} drives {plant.driven}: {sized}",
         ),
         (
-            plant.free and s.law.name in joint_catalogue(),
+            plant.free and s.law.name in joint_law_catalogue(),
             f"drives all of them, and {plant.name} has {plant.free} without an actuator: give a "
             "law of your own, smc.design.lqr or smc.law_from(K)",
         ),

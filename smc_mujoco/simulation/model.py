@@ -387,10 +387,10 @@ def compile_model(scenario: Scenario, nuserdata: int = 0, scenery: bool = True) 
         without_scenery(edited, pushed(scenario))
     for texture in edited.textures:
         texture.width, texture.height = 1, 6  # a skybox has six sides
-    return compiled(edited, scenario, nuserdata)
+    return compiled_model(edited, scenario, nuserdata)
 
 
-def compiled(spec: mujoco.MjSpec, scenario: Scenario, nuserdata: int = 0) -> mujoco.MjModel:
+def compiled_model(spec: mujoco.MjSpec, scenario: Scenario, nuserdata: int = 0) -> mujoco.MjModel:
     """Return the model of a mechanism, with the step and the integrator of a scenario, and without
     its values.
     """

@@ -18,7 +18,7 @@ from smc_mujoco.simulation.scenario import Scenario
 FIXED = "period", "delay", "skew"  # numbers of a sensor, by which readings are under way
 
 
-def check(scenario: Scenario) -> None:
+def check_jump(scenario: Scenario) -> None:
     """Raise ScenarioError for a number of a part that cannot change in a run."""
     before, *later = scenario.machines
     for after in later:
@@ -73,4 +73,4 @@ def put(after: Scenario, packed: Any, runs: Iterator[Any]) -> None:
 def _write(numbers: np.ndarray, row: Any, values: Any) -> None:
     """Write the parameters of the function in a row."""
     place = int(row["function"]["parameters"])
-    state.view(numbers, place, (len(values),))[:] = values
+    state.array_at(numbers, place, (len(values),))[:] = values

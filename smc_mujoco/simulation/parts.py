@@ -7,7 +7,7 @@
 # (an intrinsic is called without its typing context)
 from numba import njit
 
-from smc_mujoco.common.jit import call, not_inlined, place
+from smc_mujoco.common.jit import address_of, call, not_inlined
 from smc_mujoco.mechanisms.hardware.moments import (
     PART,
     channel_at,
@@ -35,13 +35,13 @@ def clear_joints(sim, data):
 @njit(error_model="numpy", inline="always")
 def keep_reach(reach, data):
     """Keep where the arrays are that `act` and `push` reach."""
-    reach.qpos = place(data.qpos)
-    reach.qvel = place(data.qvel)
-    reach.ctrl = place(data.ctrl)
-    reach.xfrc_applied = place(data.xfrc_applied)
-    reach.qfrc_applied = place(data.qfrc_applied)
-    reach.actuator_force = place(data.actuator_force)
-    reach.ten_J = place(data.ten_J)
+    reach.qpos = address_of(data.qpos)
+    reach.qvel = address_of(data.qvel)
+    reach.ctrl = address_of(data.ctrl)
+    reach.xfrc_applied = address_of(data.xfrc_applied)
+    reach.qfrc_applied = address_of(data.qfrc_applied)
+    reach.actuator_force = address_of(data.actuator_force)
+    reach.ten_J = address_of(data.ten_J)
     reach.actuator_user = data.actuator_user
     reach.body_user = data.body_user
 
@@ -110,7 +110,7 @@ def _exert(address, sim, data, part):
         state.level = data.dof_frictionloss[joint] + out.grip
         if not state.level < MAX_CONTROL:
             return True
-        if place(data.efc_frictionloss) != 0:  # MuJoCo has had room for its constraints
+        if address_of(data.efc_frictionloss) != 0:  # MuJoCo has had room for its constraints
             data.efc_frictionloss[part.row] = state.level
             data.efc_aref[part.row] -= out.away / (sim.step * sim.step)
     if part.ctrl >= 0:

@@ -113,13 +113,13 @@ def prepare(scenario: object) -> Prepared:
     shared = mechanism(scenario)
     check_start(shared, scenario)
     key = shared, scenario.control_period, scenario.samples
-    reason = why_not(scenario)
+    reason = why_not_compiled(scenario)
     _refuse_mistakes(scenario.resolved, reason)
-    part_jump.check(scenario.resolved)
+    part_jump.check_jump(scenario.resolved)
     return Prepared(scenario, reason, shared, key)
 
 
-def why_not(scenario: Scenario) -> str:
+def why_not_compiled(scenario: Scenario) -> str:
     """Return what of a scenario does not compile, in one sentence; "" if all functions do."""
     try:
         _compile(scenario.resolved)

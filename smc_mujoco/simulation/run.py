@@ -634,9 +634,9 @@ class ScenarioBatch:
         channel = int(record["seen"]["i"])
         width = int(record["width"])
         place = int(record["commands"])
-        commands = state.view(numbers, place, (2, width))
+        commands = state.array_at(numbers, place, (2, width))
         start = int(record["law"]["memory"])
-        slots = state.view(numbers, start, (n, s.law.memory))
+        slots = state.array_at(numbers, start, (n, s.law.memory))
         memory = slots.copy()
         if s.law.joint:
             law = s.law

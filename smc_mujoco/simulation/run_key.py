@@ -53,7 +53,7 @@ def description(scenario: Scenario) -> Fields:
     return data
 
 
-def key(scenario: Scenario, data: Fields | None = None, plants: Hashes | None = None) -> str:
+def run_key(scenario: Scenario, data: Fields | None = None, plants: Hashes | None = None) -> str:
     """Return a hash, 32 hex digits, of all that determines a run: scenario, code, versions.
 
     A user's code counts, and not the name of its module: the same file is `__main__` as a script,
@@ -97,18 +97,18 @@ def row(scenario: Scenario, plants: Hashes | None = None) -> Fields:
     """Return the columns of a table that describe a run. `plants` is as in `key`."""
     data = description(scenario)
     return {
-        "hash": key(scenario, data, plants),
+        "hash": run_key(scenario, data, plants),
         "plant": scenario.plant.name,
         "law": scenario.law.name,
         "gains": to_json(dict(scenario.law.gains)),
         "seed": scenario.seed,
         "duration": scenario.duration,
         "versions": to_json(data["versions"]),
-        **labels(scenario, data),
+        **run_labels(scenario, data),
     }
 
 
-def labels(scenario: Scenario, data: Fields | None = None) -> dict[str, str | None]:
+def run_labels(scenario: Scenario, data: Fields | None = None) -> dict[str, str | None]:
     """Return the columns of a table that two runs of one key may differ in: where the gains come
     from, and how the condition is called.
     """

@@ -163,9 +163,9 @@ class Scenario:
 
     # converted in this order
     plant: Plant = field(coerce.plant)
-    law: Law = field(coerce.laws, None)
+    law: Law = field(coerce.coerced_laws, None)
     model: Annotated[str, OneOf(names=coerce.MODELS)] | None = None
-    surface: Surface | None = field(coerce.surface, None)
+    surface: Surface | None = field(coerce.coerced_surface, None)
     duration: Annotated[float, Number(above=0.0, high=MAX_TIME)] = 10.0
     control_period: Annotated[float, Number(low=MIN_TIME)] = 1e-3
     physics_step: float | None = field(coerce.physics_step, None)
@@ -231,7 +231,7 @@ class Scenario:
 
     def __post_init__(self) -> None:
         self._convert()
-        scenario_checks.check(self.resolved)
+        scenario_checks.check_fields(self.resolved)
         scenario_checks.check_start(self.resolved)
         if slip := next(doubts.of_units(self.resolved), ""):
             warn_once(slip, UnitWarning)
@@ -249,7 +249,7 @@ class Scenario:
         for f in dataclasses.fields(cls):
             vars(scenario)[f.name] = fields.get(f.name, f.default)
         scenario._convert()
-        scenario_checks.check(scenario.resolved)
+        scenario_checks.check_fields(scenario.resolved)
         return scenario
 
     def _convert(self) -> None:

@@ -10,7 +10,7 @@ from typing import Any
 import mujoco
 
 from smc_mujoco.common.errors import ScenarioError, find, shown
-from smc_mujoco.common.mjcb import compiled
+from smc_mujoco.common.mjcb import compiled_spec
 from smc_mujoco.mechanisms.hardware.contact import kinds
 from smc_mujoco.mechanisms.hardware.feedforward import Feedforward
 from smc_mujoco.mechanisms.hardware.part import Friction
@@ -33,7 +33,7 @@ MAX_STEPS = 100_000_000  # per run: minutes of computing
 MAX_VALUES = 20_000_000  # control samples times channels: a trace of about 1 GB
 
 
-def check(s: Any) -> None:
+def check_fields(s: Any) -> None:
     """Raise ScenarioError for fields that do not fit together."""
     check_clock(s)
     check_signals(s)
@@ -292,4 +292,4 @@ def mechanism_model(plant: Plant, name: str) -> mujoco.MjModel:
     """Return the model of a mechanism that a plant offers."""
     spec = plant.spec()
     plant.mechanisms[name].edit(spec)
-    return compiled(spec)
+    return compiled_spec(spec)

@@ -15,8 +15,8 @@ from smc_mujoco.common.registry import subclasses
 from smc_mujoco.common.version import __version__
 from smc_mujoco.control import component_json as components
 from smc_mujoco.control.component import Component
-from smc_mujoco.control.estimator import catalogue as estimators
-from smc_mujoco.control.surface import catalogue as surfaces
+from smc_mujoco.control.estimator import estimator_catalogue as estimators
+from smc_mujoco.control.surface import surface_catalogue as surfaces
 from smc_mujoco.mechanisms.custom.model_numbers import dotted, with_model_numbers
 from smc_mujoco.mechanisms.custom.plant_from import restored
 from smc_mujoco.mechanisms.hardware.feedforward import Feedforward
@@ -118,7 +118,7 @@ def restore(data: dict, plant: Plant | None = None) -> Scenario:
     for name, value in fields.items():
         if value and value is not plant:
             fields[name] = RESTORERS.get(name, _restored)(value)
-    fields["law"] = components.law(data["law"], data.get("source"))
+    fields["law"] = components.restored_law(data["law"], data.get("source"))
     exact = Scenario.recorded(**fields)
     left_out = data.get("left_out", ())
     with_defaults = Scenario.recorded(**fields | dict.fromkeys(left_out))
@@ -178,8 +178,8 @@ def _restore_plant(data: dict) -> Plant:
 RESTORERS: Mapping[str, Callable[[Any], Any]] = {  # field -> inverse of `_data`, if not `_restored`
     "plant": _restore_plant,
     "law": lambda data: data,
-    "velocity": lambda data: components.restore(data, "estimator", estimators()),
-    "surface": lambda data: components.restore(data, "surface", surfaces()),
+    "velocity": lambda data: components.restored_component(data, "estimator", estimators()),
+    "surface": lambda data: components.restored_component(data, "surface", surfaces()),
     "noise": lambda data: Noise(**{name: _restored(item) for name, item in data.items()}),
     "clock": lambda data: Clock(**data),
     "jump": lambda data: Jump(**data),

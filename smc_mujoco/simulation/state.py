@@ -265,7 +265,7 @@ def address(array: np.ndarray) -> int:
     return array.ctypes.data  # of a record array 25 times faster than its __array_interface__
 
 
-def view(array: np.ndarray, at: int, shape: Sequence[int]) -> np.ndarray:
+def array_at(array: np.ndarray, at: int, shape: Sequence[int]) -> np.ndarray:
     """Return the numbers at an address within a float64 array, as an array of a shape."""
     first = (at - address(array)) // 8
     return array[first : first + int(np.prod(shape))].reshape(shape)

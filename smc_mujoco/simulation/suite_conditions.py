@@ -42,7 +42,7 @@ from smc_mujoco.mechanisms.hardware.stepper import of_rig
 from smc_mujoco.mechanisms.hardware.stribeck import Stribeck
 from smc_mujoco.mechanisms.layout import channel_names
 from smc_mujoco.mechanisms.plant import Plant
-from smc_mujoco.mechanisms.plant import catalogue as plants
+from smc_mujoco.mechanisms.plant import plant_catalogue as plants
 from smc_mujoco.simulation.blow import bump
 from smc_mujoco.simulation.force_bounds import U_MAX, default_u_max
 from smc_mujoco.simulation.scenario import Scenario

@@ -78,7 +78,7 @@ def compute_elsewhere(
         keys = []
         for prepared in batch:
             scenarios.append(prepared.scenario)
-            keys.append(run_key.key(prepared.scenario, plants=plants))
+            keys.append(run_key.run_key(prepared.scenario, plants=plants))
         calls.append((scenarios, keys))
     for i, columns in workers.called(executor, scored, calls):
         finish(batches[i], columns)
@@ -93,7 +93,7 @@ def scored(scenarios: Sequence[Scenario], keys: Sequence[str]) -> list[ResultCol
     """
     plants: run_key.Hashes = {}
     for scenario, key in zip(scenarios, keys, strict=True):
-        if run_key.key(scenario, plants=plants) != key:
+        if run_key.run_key(scenario, plants=plants) != key:
             raise ScenarioError(
                 f"a worker has other code for {scenario.law}: install the same there as here"
             )

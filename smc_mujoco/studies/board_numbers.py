@@ -23,7 +23,7 @@ def in_order(boards: Sequence[Board]) -> list[str]:
     return sorted(places, key=lambda law: (places[law], law))
 
 
-def size(value: float, metric: str) -> str:
+def median_text(value: float, metric: str) -> str:
     """Return a median as text: "" for NaN, a share in percent."""
     if math.isnan(value):
         return ""
@@ -35,11 +35,11 @@ def size(value: float, metric: str) -> str:
 
 
 def sizes(values: Sequence[float], metric: str) -> list[str]:
-    """Return numbers of one cell as text, each as `size` does, in one notation."""
+    """Return numbers of one cell as text, each as `median_text` does, in one notation."""
     texts = []
     for value, text in zip(values, in_one_notation(values), strict=True):
         is_word = metric == SETTLES or not math.isfinite(value)
-        texts.append(size(value, metric) if is_word else text)
+        texts.append(median_text(value, metric) if is_word else text)
     return texts
 
 

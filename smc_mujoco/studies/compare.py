@@ -35,11 +35,11 @@ from smc_mujoco.common.constraints import (
 from smc_mujoco.common.errors import MAX_ITEMS, ScenarioError, find, items_of, shown, warn_once
 from smc_mujoco.common.extras import package
 from smc_mujoco.common.files import write_text
-from smc_mujoco.common.tabular import Tabular, commented, plain
+from smc_mujoco.common.tabular import Tabular, commented, plain_text
 from smc_mujoco.common.text import counted, joined, number, span
 from smc_mujoco.control import gain_sets, source
 from smc_mujoco.control.component import Template, bounded, gains_text
-from smc_mujoco.control.law import Law, catalogue, suits
+from smc_mujoco.control.law import Law, law_catalogue, suits
 from smc_mujoco.control.properties import suitable
 from smc_mujoco.draw import wording
 from smc_mujoco.mechanisms.named import as_plant
@@ -145,7 +145,7 @@ class Compared(Answer):
             for law, *_ in candidates:
                 finite = bounded(law.gains).items()
                 of_plant[law.name] = ", ".join(f"{name}={value:.3g}" for name, value in finite)
-                if law.name not in catalogue():
+                if law.name not in law_catalogue():
                     own[law.name] = None
         return contests(self.leaderboard, gains, tuple(own))
 
@@ -358,7 +358,7 @@ class Compared(Answer):
         """
         comments = []
         for table in (self._table_of_runs, self._table_of_gains):
-            comments.append(f"{commented(plain(table))}\n")
+            comments.append(f"{commented(plain_text(table))}\n")
         text = "\n".join([*comments, *(table.to_latex() for table in self._without_times)])
         if path is not None:
             write_text(Path(path), text)
@@ -724,7 +724,7 @@ def _usual(plant: Plant) -> list[Any]:
     suited = []
     tuned = []
     for name in gain_sets.COMPARED:
-        if suits(catalogue()[name], plant):
+        if suits(law_catalogue()[name], plant):
             suited.append(name)
             if gain_sets.in_set(plant, name, "tuned"):
                 tuned.append(name)

@@ -10,7 +10,7 @@ from smc_mujoco.common.tabular import Cell, Tabular
 from smc_mujoco.common.text import counted, joined
 from smc_mujoco.studies.block import Block
 from smc_mujoco.studies.board import Board
-from smc_mujoco.studies.board_numbers import heading, in_order, size
+from smc_mujoco.studies.board_numbers import heading, in_order, median_text
 
 RATE = "tv_rate"  # the metric that is also given as a share of the bound on u
 MANY_BOUNDS = 10.0  # of a share that is no longer said in percent; chosen
@@ -89,7 +89,7 @@ def _number(board: Board, block: Block, law: str) -> Cell:
     if law not in block.medians:
         return Cell("")
     median = block.medians[law]
-    text = size(median, board.metric)
+    text = median_text(median, board.metric)
     if law in block.below and block.floor:
         text = f"<{block.floor.split()[0]}"
     elif _has_share(board) and math.isfinite(median):

@@ -37,9 +37,9 @@ from smc_mujoco.common.progress import bar
 from smc_mujoco.common.text import counted, joined
 from smc_mujoco.control import gain_sets, source
 from smc_mujoco.control.component import Component, Template
-from smc_mujoco.control.law import all_laws, catalogue, checked_name
+from smc_mujoco.control.law import all_laws, checked_name, law_catalogue
 from smc_mujoco.mechanisms.plant import Plant
-from smc_mujoco.mechanisms.plant import catalogue as plants_known
+from smc_mujoco.mechanisms.plant import plant_catalogue as plants_known
 from smc_mujoco.robustness.uncertainty import Uncertainty
 from smc_mujoco.robustness.worst_case import WorstCase, cached_worst_case
 from smc_mujoco.simulation import coerce, run_key
@@ -99,7 +99,7 @@ def law_or_template(law: Component | Template | str) -> Component | Template:
         return all_laws()[law]
     if isinstance(law, Template):
         return law
-    bound = coerce.law(law)
+    bound = coerce.coerced_law(law)
     if bound.template and bound.source.kind == source.DEFAULT:
         return bound.template
     return bound
@@ -117,7 +117,7 @@ def _without_search(
         return default_of(law)
     library = plants_known().get(plant.name)
     of_library = library is not None and library.parameters == plant.parameters
-    ours = of_library and catalogue().get(law.name) is law
+    ours = of_library and law_catalogue().get(law.name) is law
     if ours and gain_sets.in_set(plant, law.name, gains):
         count = 1
         if gains != "study":
@@ -128,14 +128,14 @@ def _without_search(
                 count = asked
         sets = []
         for seed in range(count):
-            sets.append(gain_sets.law(plant, law.name, gains, seed))
-        return Candidate(gain_sets.law(plant, law.name, gains), tuple(sets))
+            sets.append(gain_sets.law_with_gains(plant, law.name, gains, seed))
+        return Candidate(gain_sets.law_with_gains(plant, law.name, gains), tuple(sets))
     return None
 
 
 def default_of(law: Component | Template, remark: str = "") -> Candidate:
     """Return a law with its default gains."""
-    bound = coerce.law(law)
+    bound = coerce.coerced_law(law)
     return Candidate(bound, (bound,), remark)
 
 
@@ -205,7 +205,7 @@ class Trial(NamedTuple):
         law of the library, and conditions in which nothing moves.
         """
         for of_plant in laws.values():
-            components = [checked_name(coerce.law(law)) for law in of_plant]
+            components = [checked_name(coerce.coerced_law(law)) for law in of_plant]
             check_names(self.plants, components, self.conditions)
             for named in (self.plants, components, self.conditions):
                 names = set()
@@ -319,7 +319,7 @@ class Trial(NamedTuple):
             if candidate:
                 reason = candidate.remark
             else:
-                reason = search.why_not(plant, law, goal)
+                reason = search.why_not_tuned(plant, law, goal)
             if not reason:
                 return
             reasons.append(reason)
@@ -349,7 +349,7 @@ class Trial(NamedTuple):
             duration=duration,
             limits=limits,
         )
-        if limits and not shows_limits(goal.scenarios(plant, coerce.law("none"))):
+        if limits and not shows_limits(goal.scenarios(plant, coerce.coerced_law("none"))):
             goal = dataclasses.replace(goal, conditions=(NAMED["nominal"], *goal.conditions))
         return goal
 
@@ -365,7 +365,7 @@ class Trial(NamedTuple):
         defaults if it cannot be tuned.
         """
         goal = rule.goal
-        default = coerce.law(law)
+        default = coerce.coerced_law(law)
         if isinstance(law, Template):
             template = law
         else:
@@ -398,7 +398,7 @@ class Trial(NamedTuple):
             code = fingerprint.of((default.function, ranges))
             tuned = cached(
                 folder / f"{plant.name}-{law.name}-{self.search.searches}-{rule.budget}.json",
-                [run_key.key(first), goal.describe(), code, rule.quick],
+                [run_key.run_key(first), goal.describe(), code, rule.quick],
                 searched,
                 lambda made, path: made.save(path),
                 lambda path: result.load_tuned(path, plant),
@@ -478,7 +478,7 @@ class Trial(NamedTuple):
         """Return what `Candidate.holdout` does, which the folder keeps."""
         keys = []
         for law in candidate.sets:
-            keys.append(run_key.key(goal.scenarios(plant, law, count=1)[0]))
+            keys.append(run_key.run_key(goal.scenarios(plant, law, count=1)[0]))
 
         def load(path: Path) -> tuple[np.ndarray, ...]:
             with np.load(path) as parts:

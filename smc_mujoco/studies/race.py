@@ -249,7 +249,9 @@ def race(course: RaceCourse, entrants: Sequence[Entrant], relevant: float) -> Ra
     with bar(SETS, LOOKS[0] * count, course.trial.progress, counted=True) as progress:
         progress.latest = clock.ends
         begin = time.monotonic()
-        in_folder = _are_kept(course, [RaceSearch(entrant, 0) for entrant in searched(entrants)])
+        in_folder = _are_kept(
+            course, [RaceSearch(entrant, 0) for entrant in searched_laws(entrants)]
+        )
         everyone = _first_sets(course, entrants, progress)
         running = dict(everyone)
         # s that a law took in each round
@@ -258,7 +260,7 @@ def race(course: RaceCourse, entrants: Sequence[Entrant], relevant: float) -> Ra
             count = len(running)
             _expect(progress, k, count)
             start = time.monotonic()
-            pieces = [RaceSearch(entrant, k) for entrant in searched(running.values())]
+            pieces = [RaceSearch(entrant, k) for entrant in searched_laws(running.values())]
             ends = clock.race_ends(count)
             over = start + len(pieces) * _expected(rounds) > ends
             if k == TIMED and rounds and pieces:
@@ -268,7 +270,7 @@ def race(course: RaceCourse, entrants: Sequence[Entrant], relevant: float) -> Ra
             if (over and not in_folder) or not _search_round(course, pieces, ends, progress):
                 stopped = True
                 break
-            _again(course, list(searched(running.values())), ends)
+            _again(course, list(searched_laws(running.values())), ends)
             _judge(course, list(running.values()), k + 1)
             if not in_folder and pieces:
                 rounds.append((time.monotonic() - start) / len(pieces))
@@ -289,7 +291,7 @@ def race(course: RaceCourse, entrants: Sequence[Entrant], relevant: float) -> Ra
     if count < LOOKS[0]:
         comparison, looked = judged(running, course.goal, relevant), count
     unsearched = [entrant.law.name for entrant in entrants if entrant.law.name not in everyone]
-    pieces = [*searched(running.values()), *unsearched]
+    pieces = [*searched_laws(running.values()), *unsearched]
     return Race(
         entrants=everyone,
         unsearched=unsearched,
@@ -299,11 +301,11 @@ def race(course: RaceCourse, entrants: Sequence[Entrant], relevant: float) -> Ra
         looked=looked,
         stopped=stopped,
         seconds=len(pieces) * _expected(rounds),
-        shorter=any(entrant.share > 1 for entrant in searched(everyone.values())),
+        shorter=any(entrant.share > 1 for entrant in searched_laws(everyone.values())),
     )
 
 
-def searched(entrants: Iterable[Entrant]) -> Iterator[SearchedEntrant]:
+def searched_laws(entrants: Iterable[Entrant]) -> Iterator[SearchedEntrant]:
     """Yield the laws whose gains are searched."""
     for entrant in entrants:
         if isinstance(entrant, SearchedEntrant):
@@ -324,7 +326,7 @@ def _first_sets(
         _judge(course, ready[:1], 2)
         del ready[0].J[1:]
     progress.says(SETS, float(len(ready)))
-    pieces = [RaceSearch(entrant, 0) for entrant in searched(entrants)]
+    pieces = [RaceSearch(entrant, 0) for entrant in searched_laws(entrants)]
     start = time.monotonic()
     for i, result in _results(course, pieces, clock.first_sets_end, shorten=True):
         entrant = pieces[i].entrant
@@ -518,7 +520,7 @@ def _results(
         for i in missing:
             calls.append(pieces[i].entrant.call(pieces[i].k, pieces[i].draw))
         with opened(course.trial.search.executor) as pool:
-            for j, result in called(pool, search.searched, calls):
+            for j, result in called(pool, search.search_task, calls):
                 yield missing[j], _file(course, pieces[missing[j]]).keep(result)
                 if time.monotonic() > ends:
                     return
@@ -610,7 +612,7 @@ def _judgement(course: RaceCourse, entrant: Entrant, k: int) -> CachedResult[Uns
         value, half = json.loads(file.read_text(encoding="utf-8"))
         return Unseen(value, math.nan if half is None else half)
 
-    return CachedResult(path, [run_key.key(case), goal.describe(), first + k, k], save, load)
+    return CachedResult(path, [run_key.run_key(case), goal.describe(), first + k, k], save, load)
 
 
 def judgements(numbers: Sequence[int]) -> int:

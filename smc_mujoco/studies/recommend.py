@@ -217,14 +217,14 @@ def _entrants(
     candidates = trial.known(plant, laws)
     rule = trial.rule(plant, candidates)
     entrants: list[Entrant] = []
-    if all(coerce.law(law).name != WITHOUT for law in laws):
-        entrants.append(ReadyEntrant(default_of(coerce.law(WITHOUT))))
+    if all(coerce.coerced_law(law).name != WITHOUT for law in laws):
+        entrants.append(ReadyEntrant(default_of(coerce.coerced_law(WITHOUT))))
     left_out: dict[str, str] = {}
     for law, candidate in zip(laws, candidates, strict=True):
         if candidate:
             entrants.append(ReadyEntrant(candidate))
             continue
-        bound = coerce.law(law)
+        bound = coerce.coerced_law(law)
         try:
             sought = dataclasses.replace(
                 rule.goal, limits=tuple(limit.for_search for limit in goal.limits)
@@ -318,7 +318,7 @@ def _fixed(
     course: RaceCourse, chosen: Mapping[str, Component], relevant: float
 ) -> Comparison | None:
     """Return the comparison of laws with these gains, u = 0 among them; None for one law."""
-    laws = dict(chosen) | {WITHOUT: coerce.law(WITHOUT)}
+    laws = dict(chosen) | {WITHOUT: coerce.coerced_law(WITHOUT)}
     if len(laws) < 2:
         return None
     J = {}
@@ -433,7 +433,7 @@ def _weighed(
     names = [condition.name for condition in goal.conditions]
     with clock.timed(2 * count * clock.unit):
         costs, _ = weighed(plant, law, goal, instances, trial.threads)
-        none = coerce.law(WITHOUT)
+        none = coerce.coerced_law(WITHOUT)
         _, settled_without = weighed(plant, none, goal, instances, trial.threads)
     total = costs.sum(axis=0)
     parts = (total / total.sum()).tolist()
@@ -540,7 +540,7 @@ def _work_of_judgement(course: RaceCourse) -> float:
     """Return the work of the runs that judge one set of gains, at twice their step where they may
     have it. Their models are compiled here, so that the first judgement takes as long as others.
     """
-    cases = list(map(doubled, course.goal.holdout(course.plant, coerce.law(WITHOUT), 0)))
+    cases = list(map(doubled, course.goal.holdout(course.plant, coerce.coerced_law(WITHOUT), 0)))
     with bar("preparing runs", 2 * len(cases), course.trial.progress, counted=True) as drawn:
         for case in cases:
             for prepared in (case, halved(case)):

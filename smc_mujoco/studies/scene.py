@@ -29,7 +29,7 @@ from smc_mujoco.common.data import keyword_dataclass
 from smc_mujoco.common.errors import ScenarioError, items_of, shown
 from smc_mujoco.common.errors import find as lookup
 from smc_mujoco.common.files import shipped, slug
-from smc_mujoco.common.registry import Catalogue, added, source
+from smc_mujoco.common.registry import Catalogue, added, module_spec
 from smc_mujoco.common.scripts import execute
 from smc_mujoco.common.text import first_paragraph, joined, number
 from smc_mujoco.draw.film.camera import Camera, checked
@@ -296,7 +296,7 @@ def _from_to(pair: tuple[float, float], unit: str) -> str:
     return " to ".join(dict.fromkeys(texts))
 
 
-def summary(runs: Outcome) -> str:
+def scene_answer(runs: Outcome) -> str:
     """Return who settles, is first, and failed: the answer of a scene that declares none."""
     parts = [runs.count("settle"), f"first: {runs.select().least('settling_time')}"]
     failed = runs._filtered(lambda label, run: run.failure is not None)
@@ -332,7 +332,7 @@ class Scene:
     film: str = ""
     figure: str = "overview"
     answers: tuple[str, ...] = ()
-    answer: Callable[[Outcome], str] = dataclasses.field(default_factory=lambda: summary)
+    answer: Callable[[Outcome], str] = dataclasses.field(default_factory=lambda: scene_answer)
     camera: Camera | None = None
 
     def __post_init__(self):
@@ -411,7 +411,7 @@ def _of_package(point: EntryPoint) -> Path:
 
     The file is read, and not run.
     """
-    path = Path(str(source(point).origin))
+    path = Path(str(module_spec(point).origin))
     ast.parse(path.read_text(encoding="utf-8"), str(path))
     return path
 
@@ -428,7 +428,7 @@ def find(name: str) -> Path:
     return lookup("scene", name, scenes())
 
 
-def read(path: Path) -> Scene:
+def read_scene(path: Path) -> Scene:
     """Return the scene that a file declares."""
     main = sys.modules["__main__"]
     if getattr(main, "__file__", None) and Path(str(main.__file__)).resolve() == path.resolve():

@@ -99,7 +99,7 @@ class Store:
             / f"{hashlib.sha256(''.join(sorted(hashes)).encode()).hexdigest()[:32]}.parquet"
         )
         table = pa.Table.from_pylist(list(rows), schema=self.schema)
-        tables.write(path, self.schema, [table])
+        tables.write_table(path, self.schema, [table])
         for i, name in enumerate(hashes):
             self.where[name] = path, i
 
@@ -147,13 +147,13 @@ class Store:
             return data
 
         groups = (hashes[i : i + ROWS_PER_GROUP] for i in range(0, len(hashes), ROWS_PER_GROUP))
-        tables.write(self.results, self.schema, map(rows, groups))
+        tables.write_table(self.results, self.schema, map(rows, groups))
 
     def _read(self, path: Path) -> "pa.Table | None":
         """Return a part, or None for a file that is damaged or not a part."""
         try:
             with reading(path, "part", "start the study again") as file:
-                part = tables.read(file, sealed=True)
+                part = tables.read_table(file, sealed=True)
         except ScenarioError:
             return None
         complete = (
@@ -244,7 +244,7 @@ def study(
     half_steps_of = _half_step_scores(repeated, store)
 
     def changes(name: str) -> Data:
-        columns: dict[str, Any] = dict(run_key.labels(by_key[name]))
+        columns: dict[str, Any] = dict(run_key.run_labels(by_key[name]))
         if name in half_steps_of:
             columns["half_step"] = half_steps_of[name]
         return columns
@@ -259,7 +259,7 @@ def _by_key(
     """Return hash -> scenario, and open the store."""
     by_key: dict[str, Scenario] = {}
     for scenario in scenarios:
-        by_key.setdefault(run_key.key(scenario, plants=plants), scenario)
+        by_key.setdefault(run_key.run_key(scenario, plants=plants), scenario)
     store.open(resume)
     return by_key
 
@@ -308,7 +308,7 @@ def _repeated(
         if repeats_every_run(scenario) or scenario.seed % REPEATED_SEEDS == 0:
             with contextlib.suppress(ScenarioError):  # its step cannot be halved
                 half = halved(scenario).named(scenario.condition)
-                again[name] = run_key.key(half, plants=plants), half
+                again[name] = run_key.run_key(half, plants=plants), half
     return again
 
 

@@ -111,7 +111,7 @@ def content(rows: "pa.Table") -> bytes:
     return b"".join(parts)
 
 
-def write(path: Path, schema: "pa.Schema", groups: "Iterable[pa.Table]") -> None:
+def write_table(path: Path, schema: "pa.Schema", groups: "Iterable[pa.Table]") -> None:
     """Write a parquet file with a row group for each table, and a digest of all rows in its
     metadata.
 
@@ -147,8 +147,8 @@ def _median(metric: str, values: np.ndarray) -> Cell:
     return Cell(text(middle), ends, alarm=alarm)
 
 
-def read(path: Path, sealed: bool = False) -> "pa.Table":
-    """Return the rows that `write` wrote; if `sealed`, refuse a file without a digest, such as
+def read_table(path: Path, sealed: bool = False) -> "pa.Table":
+    """Return the rows of `write_table`; if `sealed`, refuse a file without a digest, such as
     another program's.
     """
     import pyarrow as pa
@@ -209,7 +209,7 @@ class Table:
         if isinstance(path, str | os.PathLike) and os.path.isdir(path):
             path = Path(path) / "results.parquet"
         with reading(path, "table", "give the results.parquet of a study that has ended") as file:
-            data = read(file)
+            data = read_table(file)
             for name in (*RUN_COLUMNS, *RESULT_COLUMNS):
                 if name not in data.column_names:
                     raise ScenarioError(f"it has no column {name!r}")

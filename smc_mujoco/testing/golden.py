@@ -16,7 +16,7 @@ from typing import Any
 
 from smc_mujoco.common.aliases import Fields, Numbers
 from smc_mujoco.common.errors import ScenarioError, number, shown
-from smc_mujoco.common.files import plain, read_json, write_text
+from smc_mujoco.common.files import plain_data, read_json, write_text
 from smc_mujoco.testing.limits import Limit, judge, quantity
 from smc_mujoco.testing.response import StepResponse
 
@@ -43,8 +43,8 @@ def record(file: Path, key: str, response: StepResponse, tolerances: Numbers) ->
         entry[name] = {"value": value, "tolerance": tolerance, "unit": unit}
     try:
         with locked(file.parent):
-            entries = dict(sorted((read(file) | {key: entry}).items()))
-            text = json.dumps(plain(entries), indent=2, ensure_ascii=False)
+            entries = dict(sorted((read_golden(file) | {key: entry}).items()))
+            text = json.dumps(plain_data(entries), indent=2, ensure_ascii=False)
             write_text(file, f"{text}\n")
     except OSError as error:
         raise ScenarioError(
@@ -52,14 +52,14 @@ def record(file: Path, key: str, response: StepResponse, tolerances: Numbers) ->
         ) from None
 
 
-def compare(file: Path, key: str, response: StepResponse, tolerances: Numbers) -> None:
+def compare_with_record(file: Path, key: str, response: StepResponse, tolerances: Numbers) -> None:
     """Compare a response with the metrics recorded under `key`.
 
     With `tolerances`, in the metrics' units, only these metrics count; without, all with the
     tolerances in the file.
     """
     tolerances = _checked(response, tolerances)
-    recorded = read(file).get(key, {})
+    recorded = read_golden(file).get(key, {})
     missing = [name for name in tolerances if name not in recorded]
     if not recorded:
         missing = missing or ["metrics"]
@@ -95,7 +95,7 @@ def _checked(response: object, tolerances: Numbers) -> dict[str, float]:
     return checked
 
 
-def read(file: Path) -> dict[str, dict[str, Fields]]:
+def read_golden(file: Path) -> dict[str, dict[str, Fields]]:
     """Return the content of a golden file, test -> metric -> value, tolerance and unit; {} if there
     is no file.
     """

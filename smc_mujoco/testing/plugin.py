@@ -87,12 +87,12 @@ def _cases(
 ) -> dict[str, list[str]]:
     """Return the test's argument, "plant" or "condition" -> the names with which the test runs."""
     from smc_mujoco.common.errors import ScenarioError, find, shown
-    from smc_mujoco.mechanisms.plant import catalogue
+    from smc_mujoco.mechanisms.plant import plant_catalogue
     from smc_mujoco.simulation.conditions import PLANTS, find_condition
 
     defaults = {"plants": PLANTS, "conditions": ("nominal",)}
     name_of = {
-        "plant": lambda item: find("plant", item, catalogue()).name,
+        "plant": lambda item: find("plant", item, plant_catalogue()).name,
         "condition": lambda item: str(find_condition(item)),
     }
     if given:
@@ -184,7 +184,7 @@ def smc_golden(request: pytest.FixtureRequest) -> Callable[..., None]:
             files.record(file, key, response, tolerances)
             request.node.user_properties.append((GOLDEN, str(file)))
         else:
-            files.compare(file, key, response, tolerances)
+            files.compare_with_record(file, key, response, tolerances)
 
     return compare
 

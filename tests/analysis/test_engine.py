@@ -10,8 +10,8 @@ import pytest
 import smc_mujoco as smc
 from smc_mujoco.analysis.engine import cpu, group
 from smc_mujoco.analysis.engine.form import FAILED_STEP, FAILURE, LOGGED, SCORES, SETTING
-from smc_mujoco.analysis.engine.scores import RESTING, holds, names
-from smc_mujoco.control.law import catalogue as laws
+from smc_mujoco.analysis.engine.scores import RESTING, engine_metrics, holds
+from smc_mujoco.control.law import law_catalogue as laws
 from smc_mujoco.hardware import ElasticJoint, RateLimit, Sigmoid
 from smc_mujoco.mechanisms.plant import Field
 from smc_mujoco.metrics import catalogue
@@ -23,7 +23,7 @@ from smc_mujoco.simulation import state
 AGREES = 1e-9  # of the start
 BESIDE = (-2e-12, -1e-12, 1e-12, 2e-12)  # rad or m
 SINE = smc.Sine(0.2, 5.0)
-EVERY = frozenset(names())  # metrics; half of what a loop takes to compile
+EVERY = frozenset(engine_metrics())  # metrics; half of what a loop takes to compile
 FEW = frozenset(("energy", "itae", "tv"))  # of u, v and x, of loops whose samples are compared
 
 

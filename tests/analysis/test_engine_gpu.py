@@ -8,9 +8,9 @@ from analysis.test_engine_worlds import PLANTS as PLANTS_OF_WORLDS
 
 import smc_mujoco as smc
 from smc_mujoco.analysis.engine import group
-from smc_mujoco.analysis.engine.scores import names
+from smc_mujoco.analysis.engine.scores import engine_metrics
 from smc_mujoco.analysis.engine.worlds import WorldGroup
-from smc_mujoco.control.law import catalogue
+from smc_mujoco.control.law import law_catalogue
 
 with_cuda = pytest.mark.skipif(
     importlib.util.find_spec("numba_cuda") is None,
@@ -27,7 +27,7 @@ PLANTS = [
     ("servo_axis", "pid"),
     ("van_der_pol", "pid"),
 ]
-LAWS = [name for name in catalogue() if not catalogue()[name].plants]
+LAWS = [name for name in law_catalogue() if not law_catalogue()[name].plants]
 FULL = {
     "noise": smc.Noise(1e-3, 5e-3),
     "input_delay": 3e-3,
@@ -67,7 +67,9 @@ def code(monkeypatch, plant, law, metrics=("settling_time",), worlds=False, **fi
 @pytest.mark.parametrize(("plant", "law"), PLANTS)
 def test_every_plant_compiles_for_a_device_with_all_parts(monkeypatch, plant, law):
     friction = FRICTION.get(plant, ())
-    assert ".entry" in code(monkeypatch, plant, law, tuple(names()), **FULL, friction=friction)
+    assert ".entry" in code(
+        monkeypatch, plant, law, tuple(engine_metrics()), **FULL, friction=friction
+    )
 
 
 @with_cuda

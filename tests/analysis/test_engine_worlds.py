@@ -11,14 +11,14 @@ from helpers.arms import arm
 import smc_mujoco as smc
 from smc_mujoco.analysis.engine import worlds
 from smc_mujoco.analysis.engine.form import FAILED_STEP, FAILURE, SCORES
-from smc_mujoco.analysis.engine.scores import RESTING, holds, names
-from smc_mujoco.control.law import catalogue as laws
+from smc_mujoco.analysis.engine.scores import RESTING, engine_metrics, holds
+from smc_mujoco.control.law import law_catalogue as laws
 from smc_mujoco.hardware import RateLimit
 from smc_mujoco.metrics import catalogue
 from smc_mujoco.signals import MinimumJerk, OrnsteinUhlenbeck, Relay
 from smc_mujoco.simulation import state
 
-EVERY = frozenset(names())  # metrics
+EVERY = frozenset(engine_metrics())  # metrics
 AGREES = 1e-12  # relative: both take the same steps in double precision
 FEW = frozenset(("energy", "iae", "max_u", "steady_error", "tv"))  # of x, v and u
 WALL = """

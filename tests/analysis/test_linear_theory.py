@@ -46,7 +46,7 @@ def growth(plant: Plant, lam: float, k1: float, control_period: float, periods: 
 
 
 def own(plant: Plant, name: str = "observer_free") -> Law:
-    return gains.law(plant.name, name, "study")
+    return gains.law_with_gains(plant.name, name, "study")
 
 
 def from_near_rest(

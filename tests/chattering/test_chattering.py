@@ -15,7 +15,7 @@ from helpers.runs import at_defaults
 import smc_mujoco as smc
 from smc_mujoco.analysis.differ import relative_range
 from smc_mujoco.analysis.step_halving import StepChange
-from smc_mujoco.chattering.cycle_tables import rows, table
+from smc_mujoco.chattering.cycle_tables import cycle_rows, table
 from smc_mujoco.chattering.harmonics import Loop, Wave, play
 from smc_mujoco.chattering.prediction import (
     Chattering,
@@ -23,7 +23,7 @@ from smc_mujoco.chattering.prediction import (
     cycles,
     switches,
 )
-from smc_mujoco.common.files import plain
+from smc_mujoco.common.files import plain_data
 from smc_mujoco.common.tabular import as_cell
 from smc_mujoco.design import chattering
 from smc_mujoco.metrics.limit_cycle import channel_cycle
@@ -361,8 +361,8 @@ def test_a_file_of_predictions_has_what_was_predicted_and_measured(snapshot):
     changes = StepChange(0.02, 0.2), StepChange(0.0, math.inf)
     measured = [(0.4, 19.0), (math.nan, math.nan)]
     said = []
-    for row in rows([run, run], [sure, possible], measured, changes):
-        said.append(json.dumps(plain(row)))
+    for row in cycle_rows([run, run], [sure, possible], measured, changes):
+        said.append(json.dumps(plain_data(row)))
     assert [*said, bool(sure), bool(possible), *(row.marked for row in changes)] == snapshot
 
 

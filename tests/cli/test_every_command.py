@@ -33,7 +33,7 @@ CALLS = {
     "list --need continuous,two-gains --json l.json": ["cli.law_pages.print_suitable"],
     "list --plant duffing": ["cli.law_pages.print_suitable"],
     "list --full": ["cli.commands.listing._print_all"],
-    "list law.c": ["exchange.c.law_from_c.check"],
+    "list law.c": ["exchange.c.law_from_c.check_law_source"],
     "explain star": ["cli.commands.glossary.meaning"],
     "run duffing": ["cli.run_scene.perform"],
     "run duffing --out there --no-film --seed 7 --threads 2 --export csv,mat --no-repeat "
@@ -251,7 +251,7 @@ UNTOLD = {
 
 @pytest.fixture(autouse=True)
 def machines_of_tests(monkeypatch):
-    monkeypatch.setattr(rig, "catalogue", machines.catalogue)
+    monkeypatch.setattr(rig, "rig_catalogue", machines.catalogue)
 
 
 class Reached(BaseException):
@@ -300,7 +300,9 @@ def reached(words: list[str], paths: list[str]) -> dict[str, str]:
 def folder(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("MUJOCO_GL", "disabled")
-    monkeypatch.setattr(gl, "missing", lambda: "not here")  # else it is kept for later tests
+    monkeypatch.setattr(
+        gl, "missing_renderer", lambda: "not here"
+    )  # else it is kept for later tests
     monkeypatch.setattr("warnings.showwarning", None)
     return tmp_path
 

@@ -28,7 +28,7 @@ from smc_mujoco.cli.commands import options, studies
 from smc_mujoco.common import gl
 from smc_mujoco.common.errors import ScenarioError, ScenarioWarning
 from smc_mujoco.draw.film import film, pace
-from smc_mujoco.mechanisms.plant import catalogue as plants
+from smc_mujoco.mechanisms.plant import plant_catalogue as plants
 from smc_mujoco.metrics.catalogue import CATALOGUE, metrics, score
 from smc_mujoco.simulation import run as runs
 from smc_mujoco.simulation.conditions import NAMED
@@ -246,9 +246,9 @@ def test_without_a_renderer_only_the_film_is_missing_and_one_line_says_the_cure(
 ):
     monkeypatch.setattr(gl, "choice", lambda: ("", "disabled"))
     monkeypatch.delenv("PYOPENGL_PLATFORM", raising=False)
-    gl.missing.cache_clear()
+    gl.missing_renderer.cache_clear()
     code, out, err = call("run", scene, "--out", "out")
-    gl.missing.cache_clear()
+    gl.missing_renderer.cache_clear()
     assert code == 0
     assert err == ""
     assert {path.name for path in (folder / "out" / "mine").iterdir()} == TRACES
@@ -667,16 +667,16 @@ def test_chatter_measures_in_runs_of_the_duration_that_it_is_given(duration, cal
 
 
 def test_x0_is_one_number_or_one_for_each_channel():
-    assert options.starts(None) is None
+    assert options.parsed_starts(None) is None
     for text, x0 in (("-0.3", (-0.3,)), ("0.3,-0.2,1", (0.3, -0.2, 1.0))):
-        starts = options.starts(text)
+        starts = options.parsed_starts(text)
         assert starts is not None
         assert starts.x0 == x0
     with pytest.raises(smc.ScenarioError, match=r"--x0 is '0.3;1': give a number"):
-        options.starts("0.3;1")
+        options.parsed_starts("0.3;1")
 
 
-@pytest.mark.skipif(gl.missing() is not None, reason="no OpenGL")
+@pytest.mark.skipif(gl.missing_renderer() is not None, reason="no OpenGL")
 def test_a_film_of_an_answer_has_as_many_pictures_as_its_time_allows(tmp_path, monkeypatch):
     clock = pace.clock
     monkeypatch.setattr(pace, "clock", lambda traces, fps, speed: clock(traces, fps, 1.0))

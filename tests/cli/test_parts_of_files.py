@@ -11,7 +11,7 @@ from helpers.machine_logs import chain
 from typer.testing import CliRunner
 
 import smc_mujoco as smc
-from smc_mujoco.analysis.tuning.objective import Objective, restore
+from smc_mujoco.analysis.tuning.objective import Objective, restored_objective
 from smc_mujoco.cli.commands import options
 from smc_mujoco.cli.main import app
 from smc_mujoco.common.scripts import object_named
@@ -115,7 +115,7 @@ def test_a_drive_of_a_file_that_cannot_be_read_is_one_sentence(rest, parts, refu
 def test_a_part_is_itself_until_its_file_changes_and_then_a_run_has_another_key(parts):
     def key() -> str:
         mine = find_condition("mine: friction=my_parts.py:stribeck(static=0.3)")
-        return run_key.key(smc.Scenario(plant="duffing", law="pid", **mine.fields))
+        return run_key.run_key(smc.Scenario(plant="duffing", law="pid", **mine.fields))
 
     def kind() -> type:
         return object_named("my_parts.py:stribeck", "part", callable)
@@ -133,14 +133,14 @@ def test_a_record_runs_no_file_that_it_names(parts, refused):
     data = Objective(conditions=(mine,)).describe()
     assert data["conditions"] == ["mine: friction=stribeck(coulomb=0.2, static=0.3, speed=0.1)"]
     data["conditions"] = ["mine: friction=evil.py:stribeck()"]
-    refused(lambda: restore(data), "evil.py", "a record runs none")
+    refused(lambda: restored_objective(data), "evil.py", "a record runs none")
     about = scenario_json.describe(smc.Scenario(plant="duffing", law="pid", **mine.fields))
     about["friction"][0]["kind"] = "other"
     refused(lambda: scenario_json.restore(about), "'other'", "runpy.run_path")
 
 
 def _key(data: bytes) -> str:
-    return run_key.key(pickle.loads(data))
+    return run_key.run_key(pickle.loads(data))
 
 
 @pytest.mark.slow
@@ -151,7 +151,7 @@ def test_another_process_knows_a_part_of_a_file_by_the_same_key(parts):
     scenario = smc.Scenario(plant="duffing", law="pid", **mine.fields)
     with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as pool:
         key = pool.submit(_key, workers.packed(scenario)).result()
-    assert key == run_key.key(scenario)
+    assert key == run_key.run_key(scenario)
 
 
 @pytest.mark.slow

@@ -72,9 +72,9 @@ TAKEN = [  # call, what it returns
     (lambda: str(ScenarioError("a" * 1001 + "b" * 500)), "a" * 997 + "..." + "b" * 500),
     (lambda: dict(frozen({"a": 1})), {"a": 1}),
     (lambda: hash(frozen({"a": 1, "b": 2})) == hash(frozen({"b": 2, "a": 1})), True),
-    (lambda: extras.missing("film", "A film", "sys", "json"), None),
+    (lambda: extras.missing_extra("film", "A film", "sys", "json"), None),
     (
-        lambda: extras.missing("film", "It", "a_", "sys", "b_"),
+        lambda: extras.missing_extra("film", "It", "a_", "sys", "b_"),
         "It needs a_ and b_: pip install 'smc-mujoco[film]'",
     ),
 ]
@@ -192,8 +192,8 @@ def test_a_missing_package_is_named_with_its_cure(monkeypatch):
 
 def test_a_missing_annex_is_named_and_no_other_module(monkeypatch):
     monkeypatch.setattr(annexes, "ANNEXES", ("metrics", "letters"))
-    assert annexes.missing("smc_mujoco.letters.post") == "letters"
-    assert annexes.missing("smc_mujoco.metrics.fold") == ""
+    assert annexes.missing_annex("smc_mujoco.letters.post") == "letters"
+    assert annexes.missing_annex("smc_mujoco.metrics.fold") == ""
     with pytest.raises(extras.MissingPackageError) as missing:
         annexes.module("smc_mujoco.letters.post", "a letter")
     assert (

@@ -26,7 +26,7 @@ from smc_mujoco.common.cache import cached
 from smc_mujoco.common.files import (
     clear_abandoned,
     from_json,
-    plain,
+    plain_data,
     reading,
     replacing,
     to_json,
@@ -62,7 +62,7 @@ def same(a: object, b: object) -> bool:
 @given(DATA)
 @settings(max_examples=20)
 def test_whatever_is_written_is_json_and_comes_back(data):
-    assert same(strict(to_json(data)), plain(data))
+    assert same(strict(to_json(data)), plain_data(data))
     assert same(from_json(to_json(data)), data)
 
 

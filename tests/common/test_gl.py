@@ -192,7 +192,7 @@ def test_the_backend_is_the_wish_or_the_first_that_loads_and_the_rest_is_said(ca
     monkeypatch.setattr(gl, "probe", lambda backend: error)
     chosen = gl.choice.__wrapped__()
     monkeypatch.setattr(gl, "choice", lambda: chosen)
-    assert [chosen[1], gl.note(), gl.missing.__wrapped__()] == expected
+    assert [chosen[1], gl.note(), gl.missing_renderer.__wrapped__()] == expected
 
 
 def test_a_trial_without_a_name_leaves_the_variable_and_one_that_hangs_ends(monkeypatch):

@@ -186,9 +186,9 @@ def test_a_model_that_does_not_compile_leaves_the_callback():
     broken.worldbody.add_geom(size=(-1.0, 0.0, 0.0))
     with mjcb.installed(control):
         with pytest.raises(ValueError, match="size"):
-            mjcb.compiled(broken)
+            mjcb.compiled_spec(broken)
         assert mujoco.get_mjcb_control() is control
-    assert in_thread(lambda: mjcb.compiled(mujoco.MjSpec())).wait(60)
+    assert in_thread(lambda: mjcb.compiled_spec(mujoco.MjSpec())).wait(60)
 
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="there is no fork here")
@@ -202,7 +202,7 @@ def test_a_forked_child_waits_for_no_thread_of_its_parent():
             entered.set()
             assert leave.wait(60)
 
-    ends = in_thread(hold), in_thread(lambda: mjcb.compiled(slow))  # pyright: ignore[reportArgumentType]
+    ends = in_thread(hold), in_thread(lambda: mjcb.compiled_spec(slow))  # pyright: ignore[reportArgumentType]
     assert entered.wait(60)
     assert slow.begun.wait(60)
     with warnings.catch_warnings():
@@ -211,9 +211,9 @@ def test_a_forked_child_waits_for_no_thread_of_its_parent():
     if child == 0:
         signal.alarm(30)  # ends it where it hangs
         own = mujoco.get_mjcb_control(), mujoco.get_mjcb_time()
-        mjcb.compiled(mujoco.MjSpec())
+        mjcb.compiled_spec(mujoco.MjSpec())
         with mjcb.installed(lambda model, data: None):
-            mjcb.compiled(mujoco.MjSpec())
+            mjcb.compiled_spec(mujoco.MjSpec())
         os._exit(
             7 if own == (mujoco.get_mjcb_control(), mujoco.get_mjcb_time()) == (None, None) else 8
         )

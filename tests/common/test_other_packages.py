@@ -24,12 +24,12 @@ ROOT = Path(__file__).parents[2]
 EXAMPLE = ROOT / "examples" / "my_smc_package"
 CACHED = (
     registry._points,
-    law.catalogue,
+    law.law_catalogue,
     law.all_laws,
-    law.joint_catalogue,
-    surface.catalogue,
-    estimator.catalogue,
-    plant.catalogue,
+    law.joint_law_catalogue,
+    surface.surface_catalogue,
+    estimator.estimator_catalogue,
+    plant.plant_catalogue,
     scene.scenes,
 )
 
@@ -197,13 +197,14 @@ def test_a_package_brings_the_gains_of_its_law(install):
         smc.ScenarioError,
         match=r"no gains in set 'tuned' for tuned_law on duffing: .*smc-mujoco tune",
     ):
-        gain_sets.law("duffing", "tuned_law")
+        gain_sets.law_with_gains("duffing", "tuned_law")
     budget = 8
     brief = Objective(conditions=("nominal",), duration=0.2)
     tuned = smc.tune("duffing", "tuned_law", budget, objective=brief, searches=2)
     tuned.save(folder / "tuned_gains" / "tuned" / "duffing-tuned_law.json")
     assert [
-        gain_sets.law("duffing", "tuned_law", seed=seed).gains for seed in range(len(tuned.sets))
+        gain_sets.law_with_gains("duffing", "tuned_law", seed=seed).gains
+        for seed in range(len(tuned.sets))
     ] == [dict(zip(tuned.bounds, gain_set.gains, strict=True)) for gain_set in tuned.sets]
     shipped = gain_sets.tuned("duffing", "tuned_law").search
     assert shipped.rule == tuned.rule
@@ -253,7 +254,7 @@ file_plant = dataclasses.replace(file_plant, build=build)
             xml.replace('stiffness="8"', f'stiffness="{stiffness}"')
         )
         keys += [
-            run_key.key(smc.Scenario(plant="file_plant", law="none", duration=0.1))
+            run_key.run_key(smc.Scenario(plant="file_plant", law="none", duration=0.1))
             for _ in range(2)
         ]
     assert keys[0] == keys[1] != keys[2] == keys[3]
@@ -319,7 +320,7 @@ def test_a_name_of_the_library_is_not_taken_over(install):
         "package 'grab': its law 'classical' (grab_laws:classical) has the name of an entry of the "
         "library"
     )
-    assert smc.law("classical").function is law.catalogue().own["classical"].function
+    assert smc.law("classical").function is law.law_catalogue().own["classical"].function
     assert "grab_laws" not in sys.modules
 
 

@@ -75,7 +75,7 @@ def test_numbers_that_stand_together_have_one_notation(values, texts):
 
 @pytest.mark.parametrize("width", [80, 44])
 def test_a_table_fits_into_a_width_with_all_its_words_marks_and_notes(width):
-    text = tabular.plain(TABLE, width)
+    text = tabular.plain_text(TABLE, width)
     rows = text.splitlines()
     assert max(map(len, rows)) <= width
     reported = re.sub(r"[\s─]", "", text)

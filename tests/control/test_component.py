@@ -40,7 +40,11 @@ def test_a_channel_without_a_gain_in_a_list_has_the_last_and_one_number_is_each_
 
 # conditions
 
-TEMPLATES = [*all_laws().values(), *surface.catalogue().values(), *estimator.catalogue().values()]
+TEMPLATES = [
+    *all_laws().values(),
+    *surface.surface_catalogue().values(),
+    *estimator.estimator_catalogue().values(),
+]
 # many of them lie on bounds
 VALUES = 0.0, 0.25, 0.5, 0.75, 1.0, 1.5, 2.0, 4.0, 64.0, 128.0, 256.0, 257.0
 RATIOS = 1.0 + np.geomspace(1e-3, 1e3, 500)

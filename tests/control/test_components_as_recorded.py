@@ -24,10 +24,10 @@ from smc_mujoco.simulation import python_functions
 pytestmark = pytest.mark.quick
 
 KINDS = {
-    "law": laws.catalogue,
-    "joint law": laws.joint_catalogue,
-    "surface": surface.catalogue,
-    "estimator": estimator.catalogue,
+    "law": laws.law_catalogue,
+    "joint law": laws.joint_law_catalogue,
+    "surface": surface.surface_catalogue,
+    "estimator": estimator.estimator_catalogue,
 }
 TEMPLATES = {f"{kind} {name}": law for kind, room in KINDS.items() for name, law in room().items()}
 COUNT = 60

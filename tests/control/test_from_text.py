@@ -159,5 +159,5 @@ def test_other_texts_are_one_sentence(files, refused):
     for text in GAINS:
         refused(lambda text=text: parsed_gains(text, "--set"), f"--set is {text!r}")
     with pytest.warns(smc.errors.GainWarning, match="1/2 < p < 1"):
-        component("surface", "terminal(p=2)", surface.catalogue(), "terminal(b=2)")
+        component("surface", "terminal(p=2)", surface.surface_catalogue(), "terminal(b=2)")
     assert parsed_gains(" lam=6, k1=3 5,", "--set") == {"lam": 6.0, "k1": (3.0, 5.0)}

@@ -40,7 +40,7 @@ def test_every_general_law_of_a_release_has_gains():
 @pytest.mark.parametrize(("gain_set", "plant"), SETS)
 def test_every_law_of_a_set_has_gains_and_these_are_all_that_tuning_moves(gain_set, plant):
     for name, tuned in shipped(gain_set, plant).items():
-        law = gains.law(plant, name, gain_set)
+        law = gains.law_with_gains(plant, name, gain_set)
         scales = search_space.scales(grid.as_plant(plant), gaber_study.U_MAX)
         for gain_set_of_search in tuned.sets:
             assert set(gain_set_of_search) == set(search_space.box(law, scales)), name
@@ -51,11 +51,11 @@ def test_every_shipped_set_is_within_its_laws_theorem(gain_set, plant):
     """Of those that are not: python benchmarks/gains.py NAME."""
     for name, tuned in shipped(gain_set, plant).items():
         for i in range(len(tuned.sets)):
-            assert not gains.law(plant, name, gain_set, i).source.outside, (name, i)
+            assert not gains.law_with_gains(plant, name, gain_set, i).source.outside, (name, i)
 
 
 def test_a_law_by_its_name_alone_has_its_shipped_gains_or_says_that_it_has_its_defaults(refused):
-    shipped = gains.law("duffing", "pid")
+    shipped = gains.law_with_gains("duffing", "pid")
     assert shipped.gains != smc.law("pid").gains
     by_name = smc.Scenario(plant="duffing", law="pid")
     assert by_name.law == smc.law("pid", plant="duffing") == shipped
@@ -78,7 +78,7 @@ def test_a_law_by_its_name_alone_has_its_shipped_gains_or_says_that_it_has_its_d
             law = smc.Scenario(plant="duffing", law="classical", **fields).law
         assert law.gains == smc.law("classical").gains
     network = smc.Scenario(plant="pendulum_network", law=["pid", smc.law("pid")] + ["pid"] * 3)
-    assert network.law.of_channel(0) == gains.law("pendulum_network", "pid")
+    assert network.law.of_channel(0) == gains.law_with_gains("pendulum_network", "pid")
     assert network.law.of_channel(1) == smc.law("pid")
     heavy = smc.plant("inverted_pendulum", m=0.7)
     for make in (
@@ -116,7 +116,9 @@ def test_shipped_gains_cost_what_their_record_says(gain_set, law):
     goal = objective.OBJECTIVES[gains.OBJECTIVES[gain_set]]
     goal = dataclasses.replace(goal, u_max=gaber_study.U_MAX)
     for i, expected in enumerate(tuned.objectives[:3]):
-        cases = goal.scenarios("duffing", gains.law("duffing", law, gain_set, i), tuned.seed, i)
+        cases = goal.scenarios(
+            "duffing", gains.law_with_gains("duffing", law, gain_set, i), tuned.seed, i
+        )
         # another processor rounds otherwise, and switching laws under noise magnify it
         assert goal.evaluation(cases[0], run(cases)).objective == pytest.approx(expected, rel=1e-2)
 

@@ -19,13 +19,13 @@ from helpers.runs import at_defaults
 
 import smc_mujoco as smc
 from smc_mujoco.control import estimator, surface
-from smc_mujoco.control.law import all_laws, catalogue
+from smc_mujoco.control.law import all_laws, law_catalogue
 from smc_mujoco.metrics.catalogue import ultimate_bound
 from smc_mujoco.simulation import gaber_study as paper
 
 LAWS = pytest.mark.parametrize("name", smc.laws())
 ACTING = pytest.mark.parametrize("name", [name for name in smc.laws() if name != "none"])
-GENERAL = [name for name, law in catalogue().items() if name != "none" and not law.plants]
+GENERAL = [name for name, law in law_catalogue().items() if name != "none" and not law.plants]
 SLOW = ("van_der_pol",)
 
 # Laws that work by the model alone, and why.
@@ -36,7 +36,7 @@ def plants(name):
     """The plants that a law applies to: those that it names, or the study's, networks of three to
     save time.
     """
-    if named := catalogue()[name].plants:
+    if named := law_catalogue()[name].plants:
         return named
     return [smc.plant(plant, n=3) if plant.endswith("network") else plant for plant in paper.GAINS]
 
@@ -120,7 +120,7 @@ def test_a_law_is_odd_in_what_it_measures_and_commands_nothing_where_there_is_no
 
 
 def test_a_first_order_law_pushes_towards_its_surface():
-    for law in (smc.law(name) for name in GENERAL if catalogue()[name].relative_degree == 1):
+    for law in (smc.law(name) for name in GENERAL if law_catalogue()[name].relative_degree == 1):
         for e, de in np.random.default_rng(0).normal(size=(200, 2)):
             u, s = called(law, measured(e, de, limit=6.0), np.zeros(law.memory))
             assert u * s <= 0.0, law
@@ -132,7 +132,7 @@ def swings():
     traces.
     """
     plant = smc.plant("pendulum_network", n=3, kc=0.0)
-    names = [name for name in smc.laws() if not catalogue()[name].plants]
+    names = [name for name in smc.laws() if not law_catalogue()[name].plants]
     scenarios = []
     for name in names:
         scenarios.append(
@@ -159,7 +159,11 @@ def test_memory_belongs_to_a_channel_and_a_run():
         np.testing.assert_array_equal(again.x, trace.x)
 
 
-ALL = [*all_laws().values(), *surface.catalogue().values(), *estimator.catalogue().values()]
+ALL = [
+    *all_laws().values(),
+    *surface.surface_catalogue().values(),
+    *estimator.estimator_catalogue().values(),
+]
 
 
 @pytest.mark.parametrize("template", ALL, ids=lambda t: f"{t.kind}-{t.name}")

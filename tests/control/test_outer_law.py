@@ -7,7 +7,7 @@ import pytest
 
 import smc_mujoco as smc
 from smc_mujoco.common.errors import ScenarioError
-from smc_mujoco.control.law import catalogue
+from smc_mujoco.control.law import law_catalogue
 from smc_mujoco.control.units import INPUT_GAIN
 
 
@@ -79,9 +79,9 @@ def test_what_has_no_one_law_of_one_channel_is_refused():
             law.on_computed_torque()
 
 
-@pytest.mark.parametrize("name", catalogue())
+@pytest.mark.parametrize("name", law_catalogue())
 def test_a_gain_that_an_outer_law_keeps_acts_and_one_that_it_drops_is_refused(name, refused):
-    template = catalogue()[name]
+    template = law_catalogue()[name]
     if template.plants:
         return
     with_outer_law = template.on_computed_torque()

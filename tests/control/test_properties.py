@@ -10,8 +10,8 @@ import pytest
 from helpers.plants_ab import called, chain, measured, plant_a, rest
 
 import smc_mujoco as smc
-from smc_mujoco.control.law import Measurement, catalogue, law_function
-from smc_mujoco.control.properties import PROPERTIES, reads, searched, suitable
+from smc_mujoco.control.law import Measurement, law_catalogue, law_function
+from smc_mujoco.control.properties import PROPERTIES, reads, searched_gains, suitable
 
 pytestmark = pytest.mark.quick
 
@@ -60,7 +60,7 @@ def changes(name):
 @pytest.mark.slow
 def test_a_law_is_changed_by_what_it_reads_and_by_nothing_else():
     for name in smc.laws():
-        read = reads(catalogue()[name])
+        read = reads(law_catalogue()[name])
         assert changes(name) <= read, name
         assert {"e", "de", "v", "dq", "q", "a", "limit"} & read <= changes(name), name
 
@@ -79,7 +79,7 @@ def test_what_a_law_reads_is_found_through_functions_and_else_is_everything():
     assert PROPERTIES["no-velocity"].holds(position_only)
     assert reads(hands_on) == set(Measurement._fields)
     # in `sliding` and `command`
-    assert {"has_surface", "model", "ddr"} <= reads(catalogue()["classical"])
+    assert {"has_surface", "model", "ddr"} <= reads(law_catalogue()["classical"])
 
 
 # continuity
@@ -149,7 +149,7 @@ def jump(name, model):
 def test_u_is_continuous_where_a_law_says_so_and_jumps_where_it_does_not():
     for name in smc.laws():
         largest = max(jump(name, model) for model in (0.0, 1.0))
-        assert (largest < JUMP) == catalogue()[name].continuous, (name, largest)
+        assert (largest < JUMP) == law_catalogue()[name].continuous, (name, largest)
 
 
 # finite time
@@ -161,7 +161,7 @@ def arrival(name):
     falls as exp(-t).
     """
     law = smc.law(name)
-    template = catalogue()[name]
+    template = law_catalogue()[name]
     h = 1e-4 if template.relative_degree == 1 else 5e-4
     ran = plant_a(law, rest, h=h, duration=2.0)
     if template.relative_degree > 1:
@@ -179,7 +179,7 @@ def arrival(name):
 
 def test_laws_with_finite_time_approach_ever_faster():
     slow = {}
-    for name, law in catalogue().items():
+    for name, law in law_catalogue().items():
         if law.finite_time and arrival(name) >= 0.6:
             slow[name] = arrival(name)
     assert not slow
@@ -211,4 +211,4 @@ def test_an_unknown_property_is_named():
 
 
 def test_gains_that_are_held_are_not_counted():
-    assert searched(catalogue()["super_twisting"]) == ["k1", "k2", "c"]
+    assert searched_gains(law_catalogue()["super_twisting"]) == ["k1", "k2", "c"]

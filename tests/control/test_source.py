@@ -28,8 +28,8 @@ def sets(name=LAW):
     """The same law with gains of each source."""
     return {
         "default": smc.law(name),
-        "shipped": gain_sets.law(PLANT, name, "tuned"),
-        "study": gain_sets.law(PLANT, name, "study"),
+        "shipped": gain_sets.law_with_gains(PLANT, name, "tuned"),
+        "study": gain_sets.law_with_gains(PLANT, name, "study"),
         "given": smc.law(name, k1=2.0),
     }
 
@@ -46,7 +46,7 @@ def test_a_law_is_the_users_only_with_gains_of_the_user():
     assert smc.Scenario(plant=PLANT, law=my_law).law.source.kind == "default"
     assert smc.law("none").source.kind == "none"
     assert smc.law("none").named("idle").source.kind == "none"
-    assert gain_sets.law(PLANT, LAW, "default").source.kind == "default"
+    assert gain_sets.law_with_gains(PLANT, LAW, "default").source.kind == "default"
 
 
 @pytest.mark.parametrize("kind", sets())
@@ -112,7 +112,7 @@ def test_replaced_gains_are_the_users():
 
 def test_gains_by_channel_are_of_their_common_source():
     default = smc.law("pid")
-    shipped = gain_sets.law("duffing", "pid")
+    shipped = gain_sets.law_with_gains("duffing", "pid")
     of_channels = by_channel(
         [
             shipped,
@@ -153,4 +153,4 @@ def test_the_gains_of_one_law_are_told_with_their_search_and_of_several_by_their
 
 
 def test_files_in_which_given_gains_were_called_yours_can_still_be_read():
-    assert source.restore({"kind": "yours", "search": None}).kind == "given"
+    assert source.restored_source({"kind": "yours", "search": None}).kind == "given"

@@ -15,7 +15,7 @@ from matplotlib.text import Text
 import smc_mujoco as smc
 from smc_mujoco.draw import decimate, horizon, panels, quantities
 from smc_mujoco.draw import figure as draw_figure
-from smc_mujoco.draw.page import FORMATS, files, write
+from smc_mujoco.draw.page import FORMATS, files, write_page
 from smc_mujoco.metrics.conventions import groups
 
 LAWS = ("observer_free", "classical")
@@ -76,7 +76,7 @@ def test_a_file_does_not_say_when_it_was_written(tmp_path, monkeypatch):
         paths = []
         for ending in FORMATS:
             paths.append(tmp_path / f"{second}.{ending}")
-        write(Figure(), paths)
+        write_page(Figure(), paths)
         written.append([path.read_bytes() for path in paths])
     assert written[0] == written[1]
 

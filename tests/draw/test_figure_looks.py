@@ -221,7 +221,7 @@ def test_runs_of_one_law_are_told_apart_by_what_differs(one):
         one, scenario=dataclasses.replace(scenario, law=smc.law("classical", k=3.0, c=5.0))
     )
     pid_run = under(one, "pid", 0.5)
-    assert wording.labels([slow, fast, pid_run], None) == [
+    assert wording.run_names([slow, fast, pid_run], None) == [
         "Classical: c = 2",
         "Classical: c = 5",
         "PID",
@@ -229,11 +229,11 @@ def test_runs_of_one_law_are_told_apart_by_what_differs(one):
     noisy = dataclasses.replace(
         slow, scenario=dataclasses.replace(slow.scenario, input_delay=0.005)
     )
-    assert wording.labels([slow, noisy], None) == [
+    assert wording.run_names([slow, noisy], None) == [
         "Classical: input delay = 0",
         "Classical: input delay = 0.005",
     ]
-    assert wording.labels([slow, slow], None) == ["Classical 1", "Classical 2"]
+    assert wording.run_names([slow, slow], None) == ["Classical 1", "Classical 2"]
 
 
 def test_words_above_the_curves_tell_which_agree_and_until_when(one):

@@ -127,7 +127,7 @@ PAGES = {
     "network": lambda: figure(network(), title="Pendulums", size=(9.0, 6.0)),
     "every panel": lambda: figure(cart(), size="ieee-column", panels=ALL, labels=["small"]),
     "arm": lambda: figure(arm(), labels=["near", "far"]),
-    "maps": lambda: region_figure.draw(basins()),
+    "maps": lambda: region_figure.draw_regions(basins()),
 }
 
 
@@ -338,7 +338,7 @@ def test_no_axis_has_an_exponent_and_its_numbers_are_in_its_unit(size, unit, fac
 
 
 def test_shares_of_a_map_are_those_of_its_states_and_add_up():
-    page = region_figure.draw(basins())
+    page = region_figure.draw_regions(basins())
     for ax, basin in zip(page.axes, basins(), strict=True):
         legend = ax.get_legend()
         assert legend is not None
@@ -396,7 +396,7 @@ REFUSED = {  # call -> arguments, and what replaces them
             {"panels": []},
         ],
     ),
-    region_figure.draw: ({"maps": []}, [{}]),
+    region_figure.draw_regions: ({"maps": []}, [{}]),
     smc.plot: ({"table": ONE}, [{}]),
     smc.show: ({"what": ONE}, [{}]),
     smc.film: (

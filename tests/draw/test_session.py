@@ -67,7 +67,7 @@ def test_a_saved_session_repeats_to_the_bit(tmp_path):
     assert session.time == pytest.approx(0.1)
     watch(session)
     path = session.save(tmp_path / "view.py")
-    (saved,) = scene.read(path).conditions["view"].values()
+    (saved,) = scene.read_scene(path).conditions["view"].values()
     assert dict(saved.law.gains)["k1"] == 5.0
     same(session, [saved])
 

@@ -20,7 +20,7 @@ from smc_mujoco.common import gl, html
 
 SIZE = (320, 180)
 FILM = {"size": SIZE, "fps": 20.0, "speed": 1.0}
-renders = pytest.mark.skipif(gl.missing() is not None, reason=str(gl.missing()))
+renders = pytest.mark.skipif(gl.missing_renderer() is not None, reason=str(gl.missing_renderer()))
 
 
 @pytest.fixture(scope="module")

@@ -159,7 +159,7 @@ def test_labels_tell_runs_of_one_law_apart_by_the_parameters_of_their_plants():
         runs.append(
             smc.Scenario(plant=smc.plant("duffing", delta=delta), law=smc.law("pid"), duration=0.01)
         )
-    labels = wording.labels(smc.run(runs), None)
+    labels = wording.run_names(smc.run(runs), None)
     assert labels == ["PID: delta = 0.2", "PID: delta = 0.5"]
     assert wording.distinct(labels) == ["delta = 0.2", "delta = 0.5"]
     heavy = smc.Scenario(
@@ -168,7 +168,10 @@ def test_labels_tell_runs_of_one_law_apart_by_the_parameters_of_their_plants():
         mismatch={"mass": 1.3},
         duration=0.01,
     )
-    assert wording.labels(smc.run([runs[0], heavy]), None) == ["PID: M = 1", "Classical: M = 1.3"]
+    assert wording.run_names(smc.run([runs[0], heavy]), None) == [
+        "PID: M = 1",
+        "Classical: M = 1.3",
+    ]
     assert wording.distinct(["PID: k = 1", "LQR"]) == ["PID: k = 1", "LQR"]
 
 
@@ -177,7 +180,7 @@ def test_a_label_leaves_out_the_last_items_of_a_long_field():
     plain = smc.Scenario(plant="duffing", law="pid", duration=0.01)
     late = smc.signals.TimeSeries((0.0, 2.0, 2.5, 5.0), (0.0, 0.0, 0.01, 0.01))
     read = dataclasses.replace(plain, noise=smc.Noise(position=0.0002, position_error=late))
-    labels = wording.labels(smc.run([plain, read]), None)
+    labels = wording.run_names(smc.run([plain, read]), None)
     assert labels == ["PID: no noise", "PID: noise position 0.0002, position error Time series"]
 
 

@@ -41,7 +41,7 @@ def check_curves(page):
 
 def runs(name):
     """The runs of a scene's film, and what it calls them."""
-    scene = scenes.read(scenes.find(name))
+    scene = scenes.read_scene(scenes.find(name))
     scenarios = scene.conditions[scene.film]
     short = []
     for scenario in scenarios.values():
@@ -62,7 +62,7 @@ for name in sorted(path.stem for path in (ROOT / "scenes").glob("*.py")):
     SCENES.append(name if quick else pytest.param(name, marks=pytest.mark.slow))
 
 
-@pytest.mark.skipif(gl.missing() is not None, reason=str(gl.missing()))
+@pytest.mark.skipif(gl.missing_renderer() is not None, reason=str(gl.missing_renderer()))
 @pytest.mark.parametrize("name", SCENES)
 @pytest.mark.filterwarnings("ignore::smc_mujoco.errors.ScenarioWarning")
 def test_a_scene_s_pictures_cut_and_overprint_nothing(name, monkeypatch):

@@ -380,7 +380,7 @@ DRAWN = [
 def test_gymnasium_s_own_checker_passes(plant, task):
     from gymnasium.utils.env_checker import check_env
 
-    if (plant, task) in DRAWN and not gl.missing():
+    if (plant, task) in DRAWN and not gl.missing_renderer():
         drawn = "rgb_array"
     else:
         drawn = None
@@ -404,7 +404,7 @@ def test_environments_step_in_processes_of_their_own():
         workers.close()
 
 
-@pytest.mark.skipif(bool(gl.missing()), reason=str(gl.missing()))
+@pytest.mark.skipif(bool(gl.missing_renderer()), reason=str(gl.missing_renderer()))
 def test_it_is_seen():
     single = gymnasium.make("smc_mujoco:Duffing-v0", render_mode="rgb_array")
     single.reset(seed=0)

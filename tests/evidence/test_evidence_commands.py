@@ -177,7 +177,7 @@ STUBS = {  # of each command: the functions replaced, and what they give
         "evidence.audit.paper.papers": {
             "small": SimpleNamespace(authors="A. B", title="C", contents="3 claims")
         },
-        "evidence.audit.evidence.check": {
+        "evidence.audit.evidence.read_sealed": {
             "paper": {"authors": "A. B and others", "title": "C" * 90},
             "counts": {"supported": 2},
         },

@@ -182,10 +182,10 @@ def test_a_file_that_changed_is_another_law_to_a_study(tmp_path, monkeypatch):
     file = tmp_path / "net.onnx"
     file.write_bytes(b"x")
     first, again = (
-        run_key.key(smc.Scenario(plant="duffing", law=smc.policy(file))) for _ in range(2)
+        run_key.run_key(smc.Scenario(plant="duffing", law=smc.policy(file))) for _ in range(2)
     )
     file.write_bytes(b"y")
-    assert first == again != run_key.key(smc.Scenario(plant="duffing", law=smc.policy(file)))
+    assert first == again != run_key.run_key(smc.Scenario(plant="duffing", law=smc.policy(file)))
 
 
 @pytest.mark.parametrize(

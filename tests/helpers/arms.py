@@ -3,12 +3,12 @@
 import functools
 
 import smc_mujoco as smc
-from smc_mujoco.control.law import FREE_BODY, joint_catalogue
+from smc_mujoco.control.law import FREE_BODY, joint_law_catalogue
 from smc_mujoco.mechanisms.plant import Plant
 
 # laws that an arm can have; those of a free body take parts of arrays, which have no translation
 # into C
-LAWS = {name: law for name, law in joint_catalogue().items() if FREE_BODY not in law.plants}
+LAWS = {name: law for name, law in joint_law_catalogue().items() if FREE_BODY not in law.plants}
 
 ARM = """
 <mujoco model="arm">

@@ -1,6 +1,6 @@
 """Two machines that tests identify, so that they need none of the published ones.
 
-monkeypatch.setattr(rig, "catalogue", machines.catalogue)    # smc.rig("axis") is AXIS
+monkeypatch.setattr(rig, "rig_catalogue", machines.catalogue)  # smc.rig("axis") is AXIS
 """
 
 import math
@@ -9,7 +9,7 @@ import numpy as np
 
 from smc_mujoco.common.registry import Catalogue
 from smc_mujoco.control.estimator import estimator
-from smc_mujoco.control.law import law, law_function
+from smc_mujoco.control.law import law_function, library_law
 from smc_mujoco.control.source import SHIPPED
 from smc_mujoco.control.units import Gain
 from smc_mujoco.identification.published_rig import PublishedRig
@@ -117,8 +117,8 @@ PENDULUM = PublishedRig(
         {"inertia": 0.166, "mass_moment": 0.318, "coulomb": 0.24},
     ),
     laws=(
-        law("classical", k=1.578, c=16.55).sourced(SHIPPED),
-        law("pid", kp=341.0, ki=1107.0, kd=4.143, tt=0.1287).sourced(SHIPPED),
+        library_law("classical", k=1.578, c=16.55).sourced(SHIPPED),
+        library_law("pid", kp=341.0, ki=1107.0, kd=4.143, tt=0.1287).sourced(SHIPPED),
     ),
     x0=(0.3,),
 )

@@ -2,7 +2,7 @@
 
 import mujoco
 
-from smc_mujoco.mechanisms.plant import write
+from smc_mujoco.mechanisms.plant import write_fields
 
 SORTS = {
     "geom": "ngeom",
@@ -32,6 +32,6 @@ def build(p, *parts, h=2.5e-4, integrator=mujoco.mjtIntegrator.mjINT_IMPLICITFAS
     model = spec.compile()
     model.opt.timestep, model.opt.integrator = h, integrator
     for part in parts:
-        write(model, part.fields(model))
+        write_fields(model, part.fields(model))
     mujoco.mj_setConst(model, mujoco.MjData(model))
     return model

@@ -16,7 +16,7 @@ def run_rows(group, rows):
     """The scores of rows, (runs, SCORES + metrics), of the group's scenarios in turn."""
     runs = group.runs
     work, scores = runs.start(len(rows))
-    control = world_callback.compiled(runs.form)
+    control = world_callback.compiled_callback(runs.form)
     for i in range(len(rows)):
         scenario = runs.scenarios[i % len(runs.scenarios)]
         model = with_values(runs.model, scenario)

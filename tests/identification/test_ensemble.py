@@ -72,7 +72,7 @@ def test_a_rig_has_laws_and_a_start_of_its_own():
 
 @pytest.mark.slow
 def test_a_law_is_tuned_on_a_machine_and_compared_there(tmp_path, monkeypatch):
-    monkeypatch.setattr(rig, "catalogue", machines.catalogue)
+    monkeypatch.setattr(rig, "rig_catalogue", machines.catalogue)
     words = ["compare", "--rig", "lifted_pendulum", "--law", "pid,twisting", "--searches=1"]
     more = ["--seeds", "1", "--duration", "0.5", "--allow-defaults", "--out", str(tmp_path)]
     with pytest.MonkeyPatch.context() as patch:
@@ -94,7 +94,7 @@ def test_a_law_by_name_has_the_gains_of_the_rig():
 
 
 def test_the_command_identifies_from_files(tmp_path, monkeypatch):
-    monkeypatch.setattr(rig, "catalogue", machines.catalogue)
+    monkeypatch.setattr(rig, "rig_catalogue", machines.catalogue)
     run = smc.run(AXIS.scenario(duration=0.3, reference=smc.Sine(0.05, 8.0), x0=0.0))
     np.savez(tmp_path / "run.npz", **records.of_trace(run, AXIS.columns))
     words = [

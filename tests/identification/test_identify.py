@@ -173,7 +173,7 @@ def test_parameters_that_cannot_be_told_apart_are_named(swung):
     ],
 )
 def test_what_cannot_be_found_is_named(rig, names, words, monkeypatch):
-    monkeypatch.setattr(rigs, "catalogue", machines.catalogue)
+    monkeypatch.setattr(rigs, "rig_catalogue", machines.catalogue)
     t = np.arange(0.0, 1.0, 0.002)
     log = {"t": t, "x": np.sin(5.0 * t), "u": np.cos(t)}
     with pytest.raises(smc.ScenarioError, match=words):

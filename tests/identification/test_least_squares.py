@@ -571,7 +571,7 @@ def test_torques_above_5_hz_are_left_out_by_four_poles_forward_and_backward(hert
     columns = records.Columns(torque=("tau",))
     data = {"t": t, "tau": np.sin(math.tau * hertz * t)}
     (low,), times = (
-        inverse_dynamics.measured(data, columns).values(),
+        inverse_dynamics.measured_torque(data, columns).values(),
         inverse_dynamics.times(data, columns),
     )
     np.testing.assert_allclose(np.diff(times), 0.01, rtol=1e-9)

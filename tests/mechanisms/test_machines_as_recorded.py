@@ -13,13 +13,13 @@ import numpy as np
 import pytest
 from helpers.words import recorded
 
-from smc_mujoco.common.mjcb import compiled
+from smc_mujoco.common.mjcb import compiled_spec
 from smc_mujoco.common.rebuild import rebuild
-from smc_mujoco.mechanisms.plant import catalogue, plant, write
+from smc_mujoco.mechanisms.plant import plant, plant_catalogue, write_fields
 
 PLANTS = {
     name: machine_of_name if machine_of_name.n == machine_of_name.sizes[0] else plant(name, n=12)
-    for name, machine_of_name in catalogue().items()
+    for name, machine_of_name in plant_catalogue().items()
 }
 NOT_READ = {"reach", "friction", "n", "contacts", "mechanisms"}
 PHYSICS = {  # what blows and springs are made of
@@ -98,8 +98,8 @@ def machine(one, how):
         for joint_kind in kind:
             if joint_kind.name:
                 names.append(joint_kind.name)
-    model = compiled(spec)
-    write(model, fields(model, values))
+    model = compiled_spec(spec)
+    write_fields(model, fields(model, values))
     return names, model
 
 

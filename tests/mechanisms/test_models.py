@@ -11,19 +11,21 @@ import pytest
 import smc_mujoco as smc
 from smc_mujoco.mechanisms.custom.nominal_model import NominalModel
 from smc_mujoco.mechanisms.layout import joint_ids
-from smc_mujoco.mechanisms.plant import catalogue, plant, write
+from smc_mujoco.mechanisms.plant import plant, plant_catalogue, write_fields
 
 pytestmark = pytest.mark.quick
 
-ALL = sorted(catalogue())
-NAMES = [name for name in ALL if not catalogue()[name].pose]  # of a free body see test_quadrotor.py
+ALL = sorted(plant_catalogue())
+NAMES = [
+    name for name in ALL if not plant_catalogue()[name].pose
+]  # of a free body see test_quadrotor.py
 # largest n -> which are tested
 SIZES = {
     1: [1],
     2: [2],
     7: [7],
 }
-SIZED = [(name, n) for name in NAMES for n in SIZES.get(catalogue()[name].sizes[1], [2, 5])]
+SIZED = [(name, n) for name in NAMES for n in SIZES.get(plant_catalogue()[name].sizes[1], [2, 5])]
 CASES = pytest.mark.parametrize(("name", "n"), SIZED, ids=[f"{name}-{n}" for name, n in SIZED])
 PLANTS = pytest.mark.parametrize("name", ALL)
 
@@ -34,7 +36,7 @@ def sized(name, n, **parameters):
     return plant(
         name,
         **size,
-        **dict.fromkeys(catalogue()[name].dry, 0.0),
+        **dict.fromkeys(plant_catalogue()[name].dry, 0.0),
         **parameters,
     )
 
@@ -43,7 +45,7 @@ def changed(name, n, rng):
     """The plant with every parameter moved by up to 40%."""
     wet = {}
     for key, value in sized(name, n).parameters.items():
-        if key not in catalogue()[name].dry:
+        if key not in plant_catalogue()[name].dry:
             wet[key] = value
     return sized(
         name, n, **{key: (value or 0.1) * rng.uniform(0.6, 1.4) for key, value in wet.items()}
@@ -108,7 +110,7 @@ def test_the_model_obeys_its_equation_with_its_own_and_with_other_parameters(nam
     for change in changes:
         assert worst_error(change, change.load(), rng) < 1e-9
     model = p.load()  # as a jump does in a running simulation
-    write(model, changes[0].fields(model, changes[0].values({})))
+    write_fields(model, changes[0].fields(model, changes[0].values({})))
     mujoco.mj_setConst(model, mujoco.MjData(model))
     assert worst_error(changes[0], model, rng) < 1e-9
 
@@ -131,7 +133,7 @@ def test_every_parameter_is_felt_by_the_model(name, n):
     """Without this, a parameter missing from `fields` and from `nominal` alike would pass."""
     rng = np.random.default_rng(4)
     size = {"n": n} if n > 1 else {}
-    p = catalogue()[name]
+    p = plant_catalogue()[name]
     values = {key: value or 0.01 * min((1.0, *p.limits)) for key, value in p.parameters.items()}
     x = within(p, rng.uniform(1.1, 2, n))
     v = rng.uniform(1, 3, n)
@@ -145,7 +147,7 @@ def test_every_parameter_is_felt_by_the_model(name, n):
 
 @PLANTS
 def test_default_fields_change_nothing_of_the_compiled_file(name):
-    p = catalogue()[name]
+    p = plant_catalogue()[name]
     model = p.spec().compile()
     for field, index, value, _ in p.fields(model, p.values({})):
         if field.startswith("opt."):

@@ -6,7 +6,7 @@ import pytest
 
 from smc_mujoco.mechanisms.geometry.pendulum_chain import HOOK_ARM
 from smc_mujoco.mechanisms.hardware.contact import Contact
-from smc_mujoco.mechanisms.plant import plant, write
+from smc_mujoco.mechanisms.plant import plant, write_fields
 
 pytestmark = pytest.mark.quick
 
@@ -18,7 +18,7 @@ def built(p, mechanism="springs", contact="none"):
     p.mechanisms[mechanism].edit(spec)
     Contact(contact).edit_on(p, spec)
     model = spec.compile()
-    write(model, p.mechanisms[mechanism].fields(model, p.values({})))
+    write_fields(model, p.mechanisms[mechanism].fields(model, p.values({})))
     data = mujoco.MjData(model)
     mujoco.mj_setConst(model, data)
     return model, data

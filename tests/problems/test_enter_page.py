@@ -29,7 +29,7 @@ def test_the_page_s_law_goes_from_its_files_to_a_row_and_is_compared(tmp_path, m
         exec(block.replace("older.zip", "results/smc-30@1"))
     assert printed.getvalue().count("soft relay") == 5  # its row, and four boards
     assert printed.getvalue().count("0 worse, 0 better") == 4
-    pages.build(tmp_path / "results", tmp_path / "pages")
+    pages.build_pages(tmp_path / "results", tmp_path / "pages")
     assert "soft relay" in (tmp_path / "pages" / "smc-30@1.html").read_text()
 
 
@@ -39,6 +39,6 @@ def test_an_example_of_an_entry_brings_a_plant_home(folder):
     problem = smc.problem(
         "quadrotor/delay_5ms@2" if folder.name == "leaning" else "duffing/noise@1"
     )
-    law = entry.read(folder).law(problem.plant)
+    law = entry.read_entry(folder).law(problem.plant)
     (trace,) = smc.run(problem.scenarios(law, [0]))
     assert problem.measures(trace)["settling"] < 4.0

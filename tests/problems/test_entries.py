@@ -50,12 +50,17 @@ def small(monkeypatch):
 
 @pytest.mark.quick
 def test_an_entry_has_its_gains_on_each_plant(tmp_path):
-    fixed = entry.read(written(tmp_path / "one", gains="[gains.all]\nk = 2.5"))
+    fixed = entry.read_entry(written(tmp_path / "one", gains="[gains.all]\nk = 2.5"))
     assert fixed.law("duffing").gains["k"] == 2.5
     assert fixed.law("furuta").gains["k"] == 2.5
     # of the library: shipped gains, defaults
-    assert [entry.read(name).division for name in ("pid", "geometric")] == ["search", "one set"]
-    free = entry.read(written(tmp_path / "free", gains="[gains.duffing]\nk = 2.5", division="free"))
+    assert [entry.read_entry(name).division for name in ("pid", "geometric")] == [
+        "search",
+        "one set",
+    ]
+    free = entry.read_entry(
+        written(tmp_path / "free", gains="[gains.duffing]\nk = 2.5", division="free")
+    )
     assert free.law("duffing").gains["k"] == 2.5
     assert free.law("van_der_pol").gains["k"] == 4.0
     assert free.law("duffing").name == "own law"
@@ -66,7 +71,7 @@ def test_an_entry_has_one_law(tmp_path):
     folder = written(tmp_path / "entry")
     (folder / "law.c").write_text("", encoding="utf-8")
     with pytest.raises(ScenarioError, match=r"law.py and law.c"):
-        entry.read(folder)
+        entry.read_entry(folder)
 
 
 def test_entering_twice_gives_equal_bytes_and_a_changed_table_is_refused(tmp_path, small):
@@ -120,7 +125,7 @@ def test_entering_twice_gives_equal_bytes_and_a_changed_table_is_refused(tmp_pat
 )
 def test_no_entry_replaces_another_of_its_name(other, tmp_path):
     target = tmp_path / "results" / "smc-30@1" / "own_law"
-    first = entry.read(written(tmp_path / "first"))
+    first = entry.read_entry(written(tmp_path / "first"))
     write_json(target / "result.json", {"entry": first.about})
     with pytest.raises(ScenarioError, match="another entry, 'own law': give this one another name"):
         entering.enter(written(tmp_path / "second", **other), out=tmp_path / "results")
@@ -131,7 +136,7 @@ def test_a_file_about_an_entry_may_begin_with_a_byte_order_mark(tmp_path):
     folder = written(tmp_path / "entry")
     about = (folder / "entry.toml").read_bytes()
     (folder / "entry.toml").write_bytes(b"\xef\xbb\xbf" + about)
-    assert entry.read(folder).name == "own law"
+    assert entry.read_entry(folder).name == "own law"
 
 
 def test_an_entry_that_is_stopped_goes_on_and_gives_the_same_bytes(tmp_path, small, monkeypatch):
@@ -142,7 +147,7 @@ def test_an_entry_that_is_stopped_goes_on_and_gives_the_same_bytes(tmp_path, sma
     job = {"problems": PROBLEMS, "count": 2, "seed": 0, "table": table, "parts": parts}
     job["folder"] = tmp_path / "entry"
     computed = []
-    runs_of = entry_runs.rows
+    runs_of = entry_runs.instance_rows
 
     def rows(one, *arguments):
         if len(computed) == 1 and not table.exists():
@@ -150,7 +155,7 @@ def test_an_entry_that_is_stopped_goes_on_and_gives_the_same_bytes(tmp_path, sma
         computed.append(one.id)
         return runs_of(one, *arguments)
 
-    monkeypatch.setattr(entry_runs, "rows", rows)
+    monkeypatch.setattr(entry_runs, "instance_rows", rows)
     with pytest.raises(KeyboardInterrupt):
         entering.run(**job)
     assert computed == [PROBLEMS[0]]
@@ -245,6 +250,6 @@ def test_variation_of_u_counts_only_where_the_easiest_accuracy_is_kept(tmp_path)
             row = dict.fromkeys(entry_runs.VALUES, 0.1 * (i + 1)) | {"problem": name, "instance": i}
             group.append(row | {easiest: 1.0 if i < accurate else np.nan})
         groups.append(group)
-    entry_runs.write(tmp_path / "runs.parquet", groups)
+    entry_runs.write_rows(tmp_path / "runs.parquet", groups)
     medians = entry_runs.EntryRuns(tmp_path / "runs.parquet").medians()
     assert [medians[name]["calm"] for name in PROBLEMS] == [np.inf, pytest.approx(0.3)]

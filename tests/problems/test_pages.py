@@ -36,7 +36,7 @@ def entered(folder, name, factor, failures=()):
                 row[column] = factor * rng.uniform(0.1, 1.0)
             group.append({"problem": cell, "instance": i, "failed": 0.0} | row)
         groups.append(group)
-    entry_runs.write(target / TABLE, groups)
+    entry_runs.write_rows(target / TABLE, groups)
     table = hashlib.sha256((target / TABLE).read_bytes()).hexdigest()
     entry = dict.fromkeys(("source", "licence", "division", "digest"), "here")
     about = {
@@ -88,7 +88,7 @@ def site(tmp_path_factory):
     ):
         entered(folder / "results", name, factor)
     entered(folder / "results", "odd", 3.0, ["duffing/noise@1#00: it diverged"])
-    return pages.build(folder / "results", folder / "site")[0].parent
+    return pages.build_pages(folder / "results", folder / "site")[0].parent
 
 
 def test_pages_are_complete_and_their_links_lead_to_pages(site):
@@ -119,7 +119,7 @@ def test_a_table_is_read_once_for_the_medians_and_once_for_each_board(site, monk
         "columns",
         lambda self, name: (read.append(name), columns(self, name))[1],
     )
-    pages.build(site.parent / "results", site)
+    pages.build_pages(site.parent / "results", site)
     on_boards = sum(len(suite.boards(name)) for name in PROBLEMS)
     assert len(read) == 3 * (len(PROBLEMS) + on_boards)
 
@@ -163,7 +163,7 @@ FORGED = {
     "one problem": (
         lambda folder: with_row(
             folder,
-            lambda table: entry_runs.write(table, [[{"problem": PROBLEMS[0], "instance": 0}]]),
+            lambda table: entry_runs.write_rows(table, [[{"problem": PROBLEMS[0], "instance": 0}]]),
         ),
         rf"1 runs of {PROBLEMS[0]}, not 3",
     ),
@@ -183,7 +183,7 @@ def test_a_forged_result_is_left_out_and_the_others_stand(tmp_path, forge, words
     ):
         entered(tmp_path / "results", name, factor)
     forge(tmp_path / "results" / "smc-30@1" / "aforged")
-    page, refused = pages.build(tmp_path / "results", tmp_path / "site")
+    page, refused = pages.build_pages(tmp_path / "results", tmp_path / "site")
     (why,) = refused
     assert re.search(words, why)
     assert str(tmp_path) not in why
@@ -196,7 +196,7 @@ def test_a_forged_result_is_left_out_and_the_others_stand(tmp_path, forge, words
 
 def test_a_folder_without_results_is_told(tmp_path):
     with pytest.raises(ScenarioError, match="enter a law first"):
-        pages.build(tmp_path, tmp_path / "site")
+        pages.build_pages(tmp_path, tmp_path / "site")
 
 
 def test_an_array_is_no_source_of_results():

@@ -251,7 +251,7 @@ def test_a_page_has_the_row_of_the_entry_that_it_is_written_for_however_far_behi
     own = tracking_page.page(board, "p.svg", "hodob")
     assert own.count("| `hodob`<br>") == 2
     assert own.count("1 more entry.") == 2  # mpc
-    assert "hodob" in tracking_picture.shown(board, "hodob")
+    assert "hodob" in tracking_picture.entries_drawn(board, "hodob")
 
 
 def pairs_in_doubt(board):

@@ -13,7 +13,7 @@ from helpers.runs import made, scenario
 import smc_mujoco as smc
 from smc_mujoco.common.errors import ScenarioWarning
 from smc_mujoco.simulation import agreement, cfunctions, python_functions
-from smc_mujoco.simulation.prepare import why_not
+from smc_mujoco.simulation.prepare import why_not_compiled
 from smc_mujoco.simulation.run import PlainLoopWarning
 from smc_mujoco.simulation.signals import Signal
 
@@ -89,7 +89,7 @@ def wrapping(y, p, memory):
 
 @pytest.mark.parametrize("fields", [{"disturbance": Wrapping()}, {"friction": wrapping()}])
 def test_signals_and_frictions_are_compared_too(fields):
-    assert "rapping gives " in why_not(scenario(duration=0.01, **fields))
+    assert "rapping gives " in why_not_compiled(scenario(duration=0.01, **fields))
 
 
 def test_what_only_compiled_code_can_do_is_no_difference():
@@ -100,7 +100,7 @@ def test_what_only_compiled_code_can_do_is_no_difference():
         return agreement_pointer(address)[0], 0.0
 
     agreement_pointer = cfunctions.pointer
-    assert why_not(scenario(made(law))) == ""
+    assert why_not_compiled(scenario(made(law))) == ""
 
 
 @pytest.mark.slow

@@ -94,8 +94,8 @@ def test_files_and_keys_hold_what_each_channel_has(traces, tmp_path):
             continue  # a test's law is not found again
         loaded = smc.load(trace.save(tmp_path / f"{i}.npz")).scenario
         assert loaded == trace.scenario
-        assert run_key.key(loaded) == run_key.key(trace.scenario)
-        keys.add(run_key.key(trace.scenario))
+        assert run_key.run_key(loaded) == run_key.run_key(trace.scenario)
+        keys.add(run_key.run_key(trace.scenario))
     assert len(keys) == 3
 
 

@@ -16,7 +16,7 @@ from smc_mujoco.simulation import gaber_study as paper
 from smc_mujoco.simulation.conditions import NAMED, applicable, find_condition, from_file, parse
 from smc_mujoco.simulation.grid import GRID_SEEDS
 from smc_mujoco.simulation.run_key import condition as reported
-from smc_mujoco.simulation.run_key import key
+from smc_mujoco.simulation.run_key import run_key
 
 pytestmark = pytest.mark.quick
 
@@ -189,7 +189,7 @@ def test_a_name_of_the_suite_changes_no_runs_key_and_ones_own_does():
     (ours,) = smc.grid("duffing", "classical", "noise", 1, gains="default")
     by_hand = paper.scenario("duffing", "classical", "noise", gains="default")
     assert ours == by_hand
-    assert key(ours) == key(by_hand)
+    assert run_key(ours) == run_key(by_hand)
     (scenario,) = smc.grid(
         "duffing",
         "classical",
@@ -198,7 +198,7 @@ def test_a_name_of_the_suite_changes_no_runs_key_and_ones_own_does():
         gains="default",
     )
     assert scenario == ours
-    assert key(scenario) != key(ours)
+    assert run_key(scenario) != run_key(ours)
 
 
 def test_starts_are_around_the_plants_own_or_around_a_given_one():

@@ -19,7 +19,7 @@ from smc_mujoco.control.joint_law import (
     saturate,
     torque,
 )
-from smc_mujoco.control.law import FREE_BODY, joint_catalogue
+from smc_mujoco.control.law import FREE_BODY, joint_law_catalogue
 from smc_mujoco.mechanisms.custom.nominal_model import NominalModel
 from smc_mujoco.mechanisms.plant import Values
 
@@ -74,7 +74,9 @@ def cases(arm):
         "mismatch": {"m": 1.4},
         "feedforward": smc.Constant(0.3),
     }
-    for name in (name for name, law in joint_catalogue().items() if FREE_BODY not in law.plants):
+    for name in (
+        name for name, law in joint_law_catalogue().items() if FREE_BODY not in law.plants
+    ):
         yield smc.Scenario(
             plant=arm,
             law=name,

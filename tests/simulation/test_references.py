@@ -11,7 +11,7 @@ from helpers import reference
 from helpers.runs import at_defaults
 
 import smc_mujoco as smc
-from smc_mujoco.control.law import catalogue
+from smc_mujoco.control.law import law_catalogue
 from smc_mujoco.simulation.signals import MinimumJerk, Ramp, Sine
 
 REFERENCES = [
@@ -23,7 +23,7 @@ REFERENCES = [
 ]
 # Laws of e and its rate, on any plant, that act: their theory is the same for every reference.
 FOLLOWING = [
-    n for n, t in catalogue().items() if t.relative_degree < 3 and not t.plants and n != "none"
+    n for n, t in law_catalogue().items() if t.relative_degree < 3 and not t.plants and n != "none"
 ]
 
 

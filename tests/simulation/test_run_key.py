@@ -25,7 +25,7 @@ from smc_mujoco.mechanisms.plant import Variant
 from smc_mujoco.metrics.catalogue import metrics
 from smc_mujoco.simulation import gaber_study, scenario_json
 from smc_mujoco.simulation.grid import grid
-from smc_mujoco.simulation.run_key import condition, key
+from smc_mujoco.simulation.run_key import condition, run_key
 
 pytestmark = pytest.mark.quick
 
@@ -63,7 +63,7 @@ def test_equal_scenarios_have_one_key_and_others_another():
     s = scenario(smc.law("classical"))
     same = scenario(smc.law("classical"), physics_step=1e-3, integrator="RK4", x0=s.resolved.x0)
     assert same == s
-    assert key(same) == key(s)
+    assert run_key(same) == run_key(s)
     different = [
         scenario(smc.law("classical", k=3.0)),
         scenario(smc.law("adaptive")),
@@ -71,16 +71,16 @@ def test_equal_scenarios_have_one_key_and_others_another():
         scenario(smc.law("classical"), duration=0.06),
         scenario(smc.law("classical"), plant=smc.plant("duffing", alpha=0.5)),
     ]
-    assert len({key(s), *map(key, different)}) == 1 + len(different)
+    assert len({run_key(s), *map(run_key, different)}) == 1 + len(different)
 
 
 def test_other_versions_are_other_runs(monkeypatch):
-    before = key(scenario(smc.law("classical")))
+    before = run_key(scenario(smc.law("classical")))
     described = scenario_json.describe
     monkeypatch.setattr(
         scenario_json, "describe", lambda s: described(s) | {"versions": {"mujoco": "99"}}
     )
-    assert key(scenario(smc.law("classical"))) != before
+    assert run_key(scenario(smc.law("classical"))) != before
 
 
 LAW = """
@@ -127,7 +127,7 @@ def written(
         words=words,
     )
     exec(compile(text, "written", "exec"), space)
-    return key(scenario(space["mine"](), disturbance=space["Push"]()))
+    return run_key(scenario(space["mine"](), disturbance=space["Push"]()))
 
 
 @pytest.mark.parametrize(
@@ -154,10 +154,10 @@ def test_a_gain_and_a_module_of_this_package_count_by_whatever_name():
     def mine(y, gains, memory):
         return -gains.module * y.e, y.e
 
-    assert key(scenario(mine(module=1.0))) != key(scenario(mine(module=2.0)))
+    assert run_key(scenario(mine(module=1.0))) != run_key(scenario(mine(module=2.0)))
     ours = scenario_json.describe(scenario(smc.law("classical")))
     of_another_module = ours | {"law": ours["law"] | {"module": "smc_mujoco.control.laws.adaptive"}}
-    assert key(scenario(smc.law("classical")), ours) != key(
+    assert run_key(scenario(smc.law("classical")), ours) != run_key(
         scenario(smc.law("classical")), of_another_module
     )
 
@@ -169,7 +169,7 @@ def test_every_law_of_a_mixture_decides_the_key():
             space: dict = {"__name__": "written"}
             exec(f"def mine(y, gains, memory): return -{factor} * y.e, y.e", space)
             laws.append(smc.law_function(space["mine"])())
-        return key(smc.Scenario(plant="double_pendulum", law=laws, duration=0.05))
+        return run_key(smc.Scenario(plant="double_pendulum", law=laws, duration=0.05))
 
     assert mixed((1.0, 2.0)) == mixed((1.0, 2.0))
     assert len({mixed(pair) for pair in ((1.0, 2.0), (1.0, 3.0), (4.0, 2.0), (2.0, 1.0))}) == 4
@@ -193,11 +193,13 @@ def test_another_order_of_a_class_s_definitions_is_no_edit():
 def test_a_key_does_not_depend_on_the_process():
     expression = "grid(['duffing'], ['adaptive'], ['noise'], [3], 'study')[0]"
     code = (
-        "from smc_mujoco import grid; from smc_mujoco.simulation.run_key import key; "
-        f"print(key({expression}))"
+        "from smc_mujoco import grid; from smc_mujoco.simulation.run_key import run_key; "
+        f"print(run_key({expression}))"
     )
     done = python("-c", code, PYTHONHASHSEED="1")
-    assert done.stdout.strip() == key(grid(["duffing"], ["adaptive"], ["noise"], [3], "study")[0])
+    assert done.stdout.strip() == run_key(
+        grid(["duffing"], ["adaptive"], ["noise"], [3], "study")[0]
+    )
 
 
 def test_types_that_a_compiler_has_made_by_then_change_no_key(monkeypatch):
@@ -205,10 +207,10 @@ def test_types_that_a_compiler_has_made_by_then_change_no_key(monkeypatch):
     which numbers them.
     """
     joint = smc.Scenario(plant="inverted_pendulum_network", law="passivity_based")
-    before = key(joint), fingerprint.now(joint.law.function)
+    before = run_key(joint), fingerprint.now(joint.law.function)
     ir.IntType(57)
     monkeypatch.setattr(from_dtype(joint_law.HANDLE), "_code", 1_000_000)
-    assert (key(joint), fingerprint.now(joint.law.function)) == before
+    assert (run_key(joint), fingerprint.now(joint.law.function)) == before
     assert fingerprint.now(types.float32) != fingerprint.now(types.float64)
 
 
@@ -226,13 +228,13 @@ def test_a_global_changes_a_run_until_its_law_is_compiled():
         )
         for x in (0.5, 0.6)
     )
-    before = key(first)
+    before = run_key(first)
     space["G"] = 5.0
-    assert key(first) != before
-    key_when_compiled = key(second)
+    assert run_key(first) != before
+    key_when_compiled = run_key(second)
     assert smc.run(second).u[0, 0] == -5.0 * 0.6
     space["G"] = 7.0
-    assert key(second) == key_when_compiled
+    assert run_key(second) == key_when_compiled
     assert smc.run(second).u[0, 0] == -5.0 * 0.6
 
 
@@ -352,7 +354,7 @@ def test_what_a_law_reads_by_a_text_is_said_not_to_count(text, names):
     law = smc.law_function(gains={"k": 1.0})(space["mine"])()
     with warnings.catch_warnings(record=True) as raised:
         warnings.simplefilter("always")
-        key(scenario(law))
+        run_key(scenario(law))
     assert [str(w.message).partition(",")[0] for w in raised] == [
         f"mine reads by {name}" for name in names
     ]
@@ -377,7 +379,7 @@ def test_a_key_changes_with_the_code_of_the_package_but_not_with_that_of_its_com
 
     def now() -> str:
         fingerprint.package.cache_clear()
-        return key(scenario)
+        return run_key(scenario)
 
     same = now()
     (package / "cli" / "words.py").write_text("# other words")
@@ -410,9 +412,9 @@ def test_replaced_functions_of_a_plant_change_the_key():
     plants = []
     for change in changes:
         plants.append(dataclasses.replace(own.plant, **change))
-    *different, same = [key(dataclasses.replace(own, plant=plant)) for plant in plants]
-    assert len({key(own), *different}) == 6
-    assert same == key(own)
+    *different, same = [run_key(dataclasses.replace(own, plant=plant)) for plant in plants]
+    assert len({run_key(own), *different}) == 6
+    assert same == run_key(own)
 
 
 def test_metrics_are_the_same_after_a_score():

@@ -30,7 +30,7 @@ from numba.core.compiler_lock import global_compiler_lock
 
 import smc_mujoco as smc
 from smc_mujoco.common import fingerprint, jit, numba_internals
-from smc_mujoco.common.jit import Key, compiled
+from smc_mujoco.common.jit import Key, compiled_cfunc
 from smc_mujoco.control.law import Measurement
 from smc_mujoco.mechanisms.hardware import moments
 from smc_mujoco.mechanisms.hardware.moments import lever
@@ -707,7 +707,9 @@ def twice(x):
 
 def hits() -> int:
     """How often a compiled function is taken from the cache, as a new process would: 0 or 1."""
-    function = compiled(numba.types.float64(numba.types.float64), twice, Key("twice", "its hash"))
+    function = compiled_cfunc(
+        numba.types.float64(numba.types.float64), twice, Key("twice", "its hash")
+    )
     assert function.ctypes(1.5) == 3.0
     return function.cache_hits
 
@@ -801,7 +803,7 @@ def test_ctrl_c_that_comes_while_numba_compiles_is_heard_when_it_is_done(monkeyp
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     monkeypatch.setattr(numba_internals, "CFunc", lambda *arguments: Pressed())
     with pytest.raises(KeyboardInterrupt):
-        compiled(numba.types.float64(numba.types.float64), math.sin)
+        compiled_cfunc(numba.types.float64(numba.types.float64), math.sin)
     assert done == [True]
     assert signal.signal(signal.SIGINT, before) is signal.default_int_handler
 
@@ -867,7 +869,7 @@ def test_many_runs_leave_no_memory_behind():
 
 
 def test_how_this_machine_rounds_is_part_of_what_a_run_is(monkeypatch):
-    here = run_key.key(scenario())
+    here = run_key.run_key(scenario())
     assert run_key.description(scenario())["versions"]["arithmetic"] == fingerprint.arithmetic()
     monkeypatch.setattr(
         fingerprint.math, "tanh", lambda x: math.nextafter(math.sinh(x) / math.cosh(x), 2.0)
@@ -880,6 +882,6 @@ def test_how_this_machine_rounds_is_part_of_what_a_run_is(monkeypatch):
     versions = importlib.import_module("smc_mujoco.simulation.scenario_json")._versions
     versions.cache_clear()
     try:
-        assert run_key.key(scenario()) != here
+        assert run_key.run_key(scenario()) != here
     finally:
         versions.cache_clear()

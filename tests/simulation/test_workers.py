@@ -14,7 +14,7 @@ import pytest
 
 import smc_mujoco as smc
 from smc_mujoco.analysis.tuning.objective import Objective
-from smc_mujoco.analysis.tuning.search import searched, tune
+from smc_mujoco.analysis.tuning.search import search_task, tune
 from smc_mujoco.simulation import run_key, workers
 from smc_mujoco.simulation.grid import grid
 from smc_mujoco.simulation.workers import called, opened
@@ -152,14 +152,14 @@ def test_a_law_of_other_code_on_a_worker_is_named(refused):
     (scenario, *_) = runs()
     refused(lambda: batches.scored([scenario], ["another key"]), "classical")
     made_of = smc.plant("duffing"), smc.law("pid"), Objective(**SHORT), 1, 0, False
-    refused(lambda: searched(*made_of, False, "other code", 0, "", 0), "pid")
+    refused(lambda: search_task(*made_of, False, "other code", 0, "", 0), "pid")
 
 
 def test_a_law_without_a_module_is_sent_by_value(monkeypatch, refused):
     law = smc.law_function(lambda y, gains, memory: (-y.e, y.e))()
     scenario = smc.Scenario(plant="duffing", duration=0.1, law=law)
     with Elsewhere(1) as pool:
-        call = ([scenario], [run_key.key(scenario)])
+        call = ([scenario], [run_key.run_key(scenario)])
         ((_, (columns,)),) = called(pool, batches.scored, [call])
     assert columns == batches.result_columns(smc.run(scenario))
     monkeypatch.setitem(sys.modules, "cloudpickle", None)

@@ -21,13 +21,13 @@ from smc_mujoco.analysis.ranking import Effect
 from smc_mujoco.answers.answers import evidence
 from smc_mujoco.answers.explain import meaning
 from smc_mujoco.answers.facts import Barred, Lead, NotRanked, Open, Tied
-from smc_mujoco.common.tabular import TEX, plain
+from smc_mujoco.common.tabular import TEX, plain_text
 from smc_mujoco.common.text import number, span
 from smc_mujoco.draw import dot_plot
 from smc_mujoco.metrics.catalogue import CATALOGUE
 from smc_mujoco.studies.block import Block
 from smc_mujoco.studies.board import Board
-from smc_mujoco.studies.board_numbers import size, sizes
+from smc_mujoco.studies.board_numbers import median_text, sizes
 from smc_mujoco.studies.board_tables import Boards
 from smc_mujoco.studies.leaderboard import leaderboard
 
@@ -129,7 +129,7 @@ def test_the_last_table_says_where_no_run_touches(touched, said):
 def test_html_and_latex_have_the_numbers_of_the_text(boards):
     """Also of a law whose name each of them must escape."""
     (table,) = boards.tables
-    text = plain(boards.full, 200)
+    text = plain_text(boards.full, 200)
     html = cells_of_html(boards)
     latex = {}
     inside = boards.to_latex().split(r"\midrule")[2].partition(r"\bottomrule")[0]
@@ -195,7 +195,7 @@ DIGITS = [  # value, metric, text
 
 @pytest.mark.parametrize(("value", "metric", "text"), DIGITS)
 def test_a_number_of_a_board_has_three_digits(value, metric, text):
-    assert [size(value, metric)] == sizes([value], metric) == [text]
+    assert [median_text(value, metric)] == sizes([value], metric) == [text]
 
 
 def test_a_cell_has_one_notation():
@@ -441,7 +441,7 @@ def test_half_a_step_that_moves_a_median_is_an_alarm():
     for row in leaderboard(table, ["itae"]).tables[0].rows:
         rows[row[0].text] = row[1]
     before = float(np.median(table.column("itae")[:20]))
-    moved = f"some runs {size(before, 'itae')}, at half the step {size(1.5 * before, 'itae')}"
+    moved = f"some runs {median_text(before, 'itae')}, at half the step {median_text(1.5 * before, 'itae')}"
     assert rows[EVIL].alarm == moved
     assert rows["second"].alarm == ""
 

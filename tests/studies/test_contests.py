@@ -16,7 +16,7 @@ from smc_mujoco.answers.templates import TEXTS, said
 from smc_mujoco.metrics.catalogue import CATALOGUE
 from smc_mujoco.robustness import sensitivity, worst_case
 from smc_mujoco.studies import compare
-from smc_mujoco.studies.board_numbers import size, unit_of
+from smc_mujoco.studies.board_numbers import median_text, unit_of
 from smc_mujoco.studies.contests import contests
 from smc_mujoco.studies.leaderboard import METRICS, leaderboard
 
@@ -86,7 +86,7 @@ def test_the_numbers_of_the_screen_are_those_of_the_boards(boards, contest):
             assert label == name
             (board,) = [candidate for candidate in boards if candidate.label == name]
             (entry,) = [entry for entry in board.entries if entry.law == law]
-            assert cell.text == size(entry.interval.median, board.metric)
+            assert cell.text == median_text(entry.interval.median, board.metric)
             assert unit.removesuffix(")") == unit_of(board)
             assert cell.strong == (board.winner == law)
     assert contest.settled

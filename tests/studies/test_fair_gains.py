@@ -17,7 +17,7 @@ from smc_mujoco.analysis.tuning import search
 from smc_mujoco.analysis.tuning.effort import Search
 from smc_mujoco.analysis.tuning.objective import Objective
 from smc_mujoco.control import from_text
-from smc_mujoco.control.law import all_laws, catalogue, law_function
+from smc_mujoco.control.law import all_laws, law_catalogue, law_function
 from smc_mujoco.control.units import FORCE_PER_POSITION, FORCE_PER_SPEED, Gain
 from smc_mujoco.simulation.conditions import NAMED, find_condition
 from smc_mujoco.simulation.grid import Draws
@@ -42,7 +42,7 @@ def test_laws_are_tuned_from_the_starts_of_the_packages_gains_where_these_are_co
     monkeypatch.setattr(Trial, "search_gains", search_gains)
     other_starts = smc.starts(x0=0.5)
     mine = law_function(gains={"k": 2.0})(lambda y, gains, memory: (-gains.k * y.e, y.e))
-    laws = [catalogue()["classical"], mine]
+    laws = [law_catalogue()["classical"], mine]
     for plant in (DUFFING, smc.plant("duffing", M=2.0)):
         trial(Path("gains"), [plant], other_starts, GainChoice(defaults=True)).candidates(
             {"duffing": laws}, 12
@@ -113,7 +113,7 @@ def test_a_law_has_its_gains_and_runs_whichever_way_its_file_is_reached(tmp_path
         return sorted(path for path in Path("out").rglob("*") if path.is_file())
 
     first = files(runpy.run_path("root_law.py", run_name="__main__")["root_sliding"])
-    (named,) = from_text.laws("root_law.py")
+    (named,) = from_text.laws_of_text("root_law.py")
     assert files(named) == first
     (gains,) = Path("out/gains").glob("*.json")
     gains.unlink()  # the file of the search is enough
@@ -208,14 +208,14 @@ def test_quick_searches_are_under_what_is_asked_for_and_noise_where_no_gains_are
         assert [condition.name for condition in rule.goal.conditions] == searched
         assert rule.goal.duration == pytest.approx(quick.duration * 2 / 3)
         assert (rule.goal.starts, rule.quick, rule.budget) == (other_starts, True, 16)
-    shipped = quick.known(DUFFING, [catalogue()["pid"]])
+    shipped = quick.known(DUFFING, [law_catalogue()["pid"]])
     rule_of_all = quick.rule(DUFFING, [*shipped, None])
     assert (rule_of_all.goal.starts, rule_of_all.quick) == (Objective().starts, False)
 
 
 def test_a_law_with_fewer_shipped_sets_than_searches_asked_for_is_tuned_too(monkeypatch):
     """It kept its three sets, whatever number was given."""
-    laws = [catalogue()[name] for name in ("fixed_time", "pid")]
+    laws = [law_catalogue()[name] for name in ("fixed_time", "pid")]
     monkeypatch.setattr(Trial, "search_gains", lambda self, plant, law, starts: law.name)
     for searches, tuned, sets in ((None, 3, 12), (3, 3, 3), (6, "fixed_time", 6)):
         gains = GainChoice(as_many=searches is not None)

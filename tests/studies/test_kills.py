@@ -21,7 +21,7 @@ import os, random, signal, sys, time
 from pathlib import Path
 from smc_mujoco.studies import batches
 from smc_mujoco.simulation.grid import grid
-from smc_mujoco.simulation.run_key import key
+from smc_mujoco.simulation.run_key import run_key
 from smc_mujoco.studies.study import Store, study
 from smc_mujoco.simulation.callback import callback as compiled_callback, silence
 from smc_mujoco.simulation.prepare import prepare
@@ -35,7 +35,7 @@ KILLER = """
 import json
 
 for scenario in scenarios:
-    prepare(scenario), key(scenario)
+    prepare(scenario), run_key(scenario)
 compiled_callback(), silence()
 
 def told(pipe):

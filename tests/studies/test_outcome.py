@@ -11,7 +11,7 @@ import pytest
 import smc_mujoco as smc
 from smc_mujoco.simulation.state import LOGGED
 from smc_mujoco.studies import scene as scenes
-from smc_mujoco.studies.scene import Outcome, summary
+from smc_mujoco.studies.scene import Outcome, scene_answer
 
 pytestmark = pytest.mark.quick
 
@@ -111,7 +111,7 @@ def test_a_run_that_failed_has_no_value_and_nothing_holds_for_it():
     assert runs.least("settling_time") == runs.most("settling_time") == "b (1.00 s)"
     assert runs.count("run", lambda trace: True) == "1 of 2 run (not a)"
     assert runs.only("a").least("settling_time") == "none"
-    assert summary(runs) == "1 of 2 settle (not a); first: b (1.00 s); failed: a"
+    assert scene_answer(runs) == "1 of 2 settle (not a); first: b (1.00 s); failed: a"
     assert runs.size("settling_time") == "1.00 s, 1 failed"
 
 
@@ -199,7 +199,7 @@ def test_names_that_are_not_there_are_refused():
 @functools.cache
 def declared(path: Path) -> tuple[smc.Scene, dict[str, dict[str, smc.Trace]]]:
     """A scene, and traces that differ from label to label and from condition to condition."""
-    scene = scenes.read(path)
+    scene = scenes.read_scene(path)
     traces: dict[str, dict[str, smc.Trace]] = {}
     for k, (condition, runs) in enumerate(scene.conditions.items()):
         traces[condition] = {}
@@ -216,7 +216,7 @@ def declared(path: Path) -> tuple[smc.Scene, dict[str, dict[str, smc.Trace]]]:
 def test_a_scene_answers_with_numbers_and_singles_out_none_of_equal_runs(path):
     scene, traces = declared(path)
     answer = scene.sentence(traces)
-    assert scene.answer is not summary
+    assert scene.answer is not scene_answer
     assert re.search(r"\d", answer)
     equal = {}
     for name, runs in traces.items():

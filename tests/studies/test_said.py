@@ -124,7 +124,7 @@ def test_a_part_with_scores_by_other_code_counts_as_not_done(tmp_path, monkeypat
     store.add([run_key.row(RUN)])
     again = study.Store(tmp_path)
     again.open(resume=True)
-    assert list(again.where) == [run_key.key(RUN)]
+    assert list(again.where) == [run_key.run_key(RUN)]
     monkeypatch.setattr(study.fingerprint, "of", lambda thing: "other")
     other_store = study.Store(tmp_path)
     other_store.open(resume=True)

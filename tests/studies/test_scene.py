@@ -58,7 +58,7 @@ def test_the_ten_scenes_of_the_study_are_there_and_are_found_by_name():
 
 
 def declared_shortly(path: Path) -> smc.Scene:
-    declared = scenes.read(path)
+    declared = scenes.read_scene(path)
     return dataclasses.replace(
         declared,
         conditions={
@@ -97,13 +97,13 @@ def test_a_scene_runs_and_its_traces_are_saved(path, tmp_path):
 @pytest.mark.parametrize("name", ["vdp_noise", "arm_wall", "chattering", "control_signals"])
 def test_a_scene_of_each_kind_of_figure_is_drawn(name, tmp_path, monkeypatch):
     pages = []
-    write = page.write
+    write = page.write_page
 
     def render_the_first(whole, paths):  # every figure is made; rendering is nine tenths of drawing
         pages.extend([paths] * bool(paths))
         return write(whole, paths[:1] if len(pages) == 1 else [])
 
-    monkeypatch.setattr(page, "write", render_the_first)
+    monkeypatch.setattr(page, "write_page", render_the_first)
     scene = declared_shortly(FOLDER / f"{name}.py")
     two = {}
     for condition, runs in [*scene.conditions.items()][:2]:
@@ -120,7 +120,7 @@ def test_a_scene_of_each_kind_of_figure_is_drawn(name, tmp_path, monkeypatch):
 
 @pytest.mark.parametrize("name", sorted(TEN))
 def test_a_scene_of_the_study_compares_all_laws_of_the_paper_under_the_same_conditions(name):
-    for runs in scenes.read(FOLDER / f"{name}.py").conditions.values():
+    for runs in scenes.read_scene(FOLDER / f"{name}.py").conditions.values():
         assert [scenario.law.name for scenario in runs.values()] == LAWS
         first, *other_runs = runs.values()
         for scenario in other_runs:
@@ -128,7 +128,7 @@ def test_a_scene_of_the_study_compares_all_laws_of_the_paper_under_the_same_cond
 
 
 def test_a_seed_reaches_every_run_of_a_scene():
-    scene = scenes.read(FOLDER / "vdp_noise.py").seeded(7)
+    scene = scenes.read_scene(FOLDER / "vdp_noise.py").seeded(7)
     assert {scenario.seed for _, _, scenario in scene.runs()} == {7}
 
 
@@ -316,7 +316,7 @@ def test_a_name_that_the_study_does_not_have_is_answered_with_the_nearest(names,
     ],
 )
 def test_the_van_der_pol_scenes_are_the_study_s_conditions(scene, conditions):
-    declared = scenes.read(FOLDER / f"{scene}.py").conditions
+    declared = scenes.read_scene(FOLDER / f"{scene}.py").conditions
     assert declared == {
         name: smc.paper.comparison("van_der_pol", options) for name, options in conditions.items()
     }
@@ -325,7 +325,7 @@ def test_the_van_der_pol_scenes_are_the_study_s_conditions(scene, conditions):
 def ends_of(name):
     """The traces of the condition that a scene films, and the names in its file."""
     path = FOLDER / f"{name}.py"
-    runs = (scene := scenes.read(path)).conditions[scene.film]
+    runs = (scene := scenes.read_scene(path)).conditions[scene.film]
     return dict(zip(runs, smc.run(runs.values()), strict=True)), execute(path)
 
 

@@ -78,12 +78,12 @@ def test_equal_gains_are_one_run_and_the_table_has_the_source_of_this_study(fold
     }
     assert table.scenario(16).law.source.kind == "default"
     tuned, default = (smc.Scenario(plant="duffing", law=law) for law in (SLOW, at_default(SLOW)))
-    assert run_key.key(tuned) == run_key.key(default)
+    assert run_key.run_key(tuned) == run_key.run_key(default)
 
 
 @pytest.mark.quick
 def test_a_table_keeps_the_search_behind_the_gains(tmp_path):
-    law = gain_sets.law("duffing", "classical", seed=0)
+    law = gain_sets.law_with_gains("duffing", "classical", seed=0)
     smc.study(smc.grid("duffing", "classical", duration=0.1), tmp_path)
     assert smc.Table.read(tmp_path).scenario(0).law.source == law.source
 

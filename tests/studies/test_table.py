@@ -17,7 +17,7 @@ import smc_mujoco as smc
 from smc_mujoco.common.errors import ScenarioWarning
 from smc_mujoco.common.text import number
 from smc_mujoco.simulation.grid import grid
-from smc_mujoco.simulation.run_key import condition, key
+from smc_mujoco.simulation.run_key import condition, run_key
 from smc_mujoco.studies.study import Store, study
 from smc_mujoco.studies.table import Table, content
 
@@ -37,7 +37,7 @@ def test_rows_are_the_scores_of_the_runs_in_order(tmp_path):
     scenarios = small()
     table = study(scenarios, tmp_path)
     for s, row in zip(scenarios, table.rows(), strict=True):
-        assert row["hash"] == key(s)
+        assert row["hash"] == run_key(s)
         scores = smc.score(smc.run(s))
         assert {name: row[name] for name in scores} == {
             n: None if math.isnan(v) else v for n, v in scores.items()
@@ -56,7 +56,7 @@ def test_rows_are_the_scores_of_the_runs_in_order(tmp_path):
 def test_equal_runs_are_one_row_where_the_first_stands(tmp_path):
     first, second, *_ = small(seeds=1)
     table = study([second, first, second, first], tmp_path)
-    assert table.column("hash").tolist() == [key(second), key(first)]
+    assert table.column("hash").tolist() == [run_key(second), run_key(first)]
 
 
 def test_a_table_is_read_back_selected_and_run_again(tmp_path):
@@ -126,7 +126,7 @@ def test_no_bit_that_flips_in_a_part_makes_other_rows(tmp_path):
             lost += 1
             continue
         assert len(store.where) == len(small())
-        store.collect([key(s) for s in small()], lambda name: {})
+        store.collect([run_key(s) for s in small()], lambda name: {})
         assert repr(Table.read(tmp_path).rows()) == right
     assert lost > 8
 

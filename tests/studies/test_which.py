@@ -27,8 +27,8 @@ from smc_mujoco.answers.templates import TEXTS, is_said
 from smc_mujoco.cli import main
 from smc_mujoco.control import gain_sets
 from smc_mujoco.control.component import Template
-from smc_mujoco.control.law import catalogue
-from smc_mujoco.control.properties import searched
+from smc_mujoco.control.law import law_catalogue
+from smc_mujoco.control.properties import searched_gains
 from smc_mujoco.robustness import level_search, margins
 from smc_mujoco.simulation.conditions import find_condition
 from smc_mujoco.simulation.grid import Draws
@@ -49,9 +49,9 @@ def test_properties_choose_laws_and_laws_with_given_gains_keep_them(tmp_path):
     names = {law.name for law in module._suited(machine, ["continuous", "two-gains"], None)}
     assert "observer_free" in names
     assert not names & {"none", "classical", "observer_free_q15", "hierarchical"}
-    for law in map(catalogue().__getitem__, names):
+    for law in map(law_catalogue().__getitem__, names):
         assert law.continuous
-        assert len(searched(law)) in (1, 2)
+        assert len(searched_gains(law)) in (1, 2)
     code = "import smc_mujoco as smc\n@smc.law_function(gains={'k': 2.0})\n"
     (tmp_path / "mine.py").write_text(f"{code}def mine(y, gains, memory):\n    return -y.e, y.e\n")
     file = str(tmp_path / "mine.py")

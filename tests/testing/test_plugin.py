@@ -263,7 +263,7 @@ def test_a_failing_test_attaches_its_figure_and_with_smc_film_its_film(pytester,
     assert Path(figure).read_bytes().startswith(b"\x89PNG")
     assert "smc_mujoco" in Path(figure).parts  # a folder in pytest's temporary one
     films = re.findall(r"^film: (.*)$", said, re.MULTILINE)
-    assert len(films) == (gl.missing() is None)
+    assert len(films) == (gl.missing_renderer() is None)
     for film in films:
         assert Path(film).stat().st_size > 1000
     assert list(pytester.path.glob("*.png")) == []
@@ -326,7 +326,7 @@ def test_a_golden_file_is_plain_and_holds_each_call(session, pytester):
 def test_a_broken_golden_file_is_one_sentence(tmp_path, refused):
     for text in ["{", "[]", '{"test": 3}']:
         (tmp_path / "a.json").write_text(text)
-        refused(lambda: golden.read(tmp_path / "a.json"), "a.json", "--smc-update")
+        refused(lambda: golden.read_golden(tmp_path / "a.json"), "a.json", "--smc-update")
 
 
 @pytest.mark.parametrize(
@@ -358,13 +358,13 @@ def test_a_golden_metric_is_within_its_tolerance_or_off(
     else:
         said = None
     with said or contextlib.nullcontext():
-        golden.compare(file, "test", response, of_test)
+        golden.compare_with_record(file, "test", response, of_test)
 
 
 def test_a_value_of_0_is_recorded_with_a_tolerance_above_rounding(step_response, tmp_path):
     response = step_response("duffing", "none", step=0.1, duration=0.01)
     golden.record(tmp_path / "a.json", "test", response, {})
-    stored = golden.read(tmp_path / "a.json")["test"]
+    stored = golden.read_golden(tmp_path / "a.json")["test"]
     assert stored["overshoot"]["tolerance"] == golden.MIN_TOLERANCE
     assert stored["peak"]["tolerance"] == (
         pytest.approx(0.01 * response.peak, rel=0.05) if response.peak else golden.MIN_TOLERANCE

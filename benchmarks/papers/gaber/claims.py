@@ -24,8 +24,8 @@ from smc_mujoco.analysis.ranking import RELEVANT
 from smc_mujoco.common.rebuild import rebuild
 from smc_mujoco.control.component import Component
 from smc_mujoco.control.estimator import estimator
-from smc_mujoco.control.law import Measurement, catalogue, command, law_function, sliding
-from smc_mujoco.control.law import law as find_law
+from smc_mujoco.control.law import Measurement, command, law_catalogue, law_function, sliding
+from smc_mujoco.control.law import library_law as find_law
 from smc_mujoco.evidence.audit.variants import variant, with_gains
 from smc_mujoco.evidence.audit.verdict import Beside, check, ratio
 from smc_mujoco.evidence.papers.gaber import lyapunov
@@ -885,7 +885,7 @@ def cheap(runs, exact):
         if name == SERIES_LAW:
             template = observer_free_series
         else:
-            template = catalogue()[name]
+            template = law_catalogue()[name]
         gains = {gain: exact.gains[gain] for gain in ("lam", "k1")} | more
         if name == FIXED_POINT_LAW:  # a word must hold lambda: its range is the next power of 2
             gains["u_range"] = max(template.defaults["u_range"], 2.0 ** math.frexp(gains["lam"])[1])

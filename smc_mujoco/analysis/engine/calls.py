@@ -32,13 +32,13 @@ from smc_mujoco.common import fingerprint
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.jit import (
     Key,
+    address_of,
     always,
     call,
     compile_for,
     floats,
     inlined,
     named,
-    place,
     record_in,
 )
 from smc_mujoco.common.numba_internals import arrayobj, cgutils
@@ -191,7 +191,7 @@ def by_channel(functions: Sequence[Any], j: int = 0) -> Any:
     return choose
 
 
-def law(form: Form, at: PartAt, compile_user: Compiler) -> Any:
+def channel_law(form: Form, at: PartAt, compile_user: Compiler) -> Any:
     """Return a function (view, y, i) -> u and s of a law of one channel."""
     if at.part.function is not None:
         return acting(at, compile_user)
@@ -219,9 +219,9 @@ def calling(form: Form, law_at: PartAt) -> Any:
 
     @inlined
     def ask(view, i):
-        first = place(view.work)
+        first = address_of(view.work)
         state = first + 8 * (memory_at + i * memory)
-        gains = place(view.row) + 8 * numbers
+        gains = address_of(view.row) + 8 * numbers
         function = int(view.row[address])
         if call(function, first + 8 * measured, gains, state, first + 8 * commanded) != 0:
             raise ValueError

@@ -24,7 +24,7 @@ LANES = 2
 
 
 @functools.lru_cache(maxsize=64)
-def compiled(form: Form) -> Any:
+def compiled_runs(form: Form) -> Any:
     """Return the compiled runs of a form, (count, addresses of rows, tables, work, scores and
     logs, bytes of a log). `work` has the state of LANES runs.
     """
@@ -62,7 +62,7 @@ def compiled(form: Form) -> Any:
 
 def _work_size(form: Form) -> int:
     """Return how many numbers the state of a run has."""
-    return layout(form).work_size + noise.size(form)
+    return layout(form).work_size + noise.drawn_size(form)
 
 
 def run_rows(
@@ -72,7 +72,7 @@ def run_rows(
 
     `logs` is (runs, K + 1, n, 6) and gets `form.LOGGED`, if the rows say `logging`.
     """
-    simulate = compiled(form)
+    simulate = compiled_runs(form)
     rows = np.array(rows, order="C")  # a copy, in which `stop` writes
     width = SCORES + len(form.metrics)
     scores = np.full((len(rows), width), np.nan)

@@ -114,7 +114,7 @@ def check_device() -> None:
 
 
 @functools.lru_cache(maxsize=64)
-def compiled(form: Form) -> Any:
+def compiled_kernel(form: Form) -> Any:
     """Return the compiled kernel of a form, for the device of this machine."""
     return cuda.jit(ARGUMENTS)(kernel(form))
 
@@ -127,7 +127,7 @@ def compiled_control(form: Form) -> Any:
 
 def run_rows(form: Form, rows: Array, tables: Array) -> Array:
     """Return the scores of runs, as `cpu.run` does."""
-    simulate = compiled(form)
+    simulate = compiled_kernel(form)
     width = SCORES + len(form.metrics)
     scores = np.full((len(rows), width), np.nan)
     points = cuda.to_device(tables)

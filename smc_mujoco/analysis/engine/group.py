@@ -162,7 +162,7 @@ def _users(s: Resolved) -> list[tuple[Any, int]]:
 
 
 def _indexes_within(user: tuple[Any, int]) -> bool:
-    return indices.within(*user)
+    return indices.constant_indices(*user)
 
 
 def steps_implicitly(s: Resolved) -> bool:
@@ -190,7 +190,7 @@ def _beside(s: Resolved) -> type[BesideJoint]:
     return Backlash if steps_implicitly(s) else ElasticJoint
 
 
-def key(scenario: Scenario) -> Hashable:
+def group_key(scenario: Scenario) -> Hashable:
     """Return what is equal for scenarios that one loop can run together."""
     return form_of(scenario.resolved)._replace(**VARYING, disturbances=())
 
@@ -348,7 +348,7 @@ class FormGroup:
     @staticmethod
     def key_of(scenario: Scenario) -> Hashable:
         """Return what is equal for scenarios that one group can run."""
-        return key(scenario)
+        return group_key(scenario)
 
     def form_of(self, s: Resolved, metrics: Sequence[str]) -> Form:
         """Return the form of one run."""

@@ -16,8 +16,8 @@ from smc_mujoco.analysis.engine.calls import (
     array_in,
     by_channel,
     calling,
+    channel_law,
     estimating,
-    law,
     reader,
     settings_in,
     signal,
@@ -38,7 +38,7 @@ from smc_mujoco.analysis.engine.form import (
 from smc_mujoco.analysis.engine.implicit_step import advancing_implicitly
 from smc_mujoco.analysis.engine.scores import COLUMN, log_in, tallying
 from smc_mujoco.common.aliases import Fields
-from smc_mujoco.common.jit import always, beyond, inlined, place, record_in
+from smc_mujoco.common.jit import address_of, always, beyond, inlined, record_in
 from smc_mujoco.control.estimator import Reading
 from smc_mujoco.control.joint_law import begin_measurement, put_channel
 from smc_mujoco.mechanisms.hardware.feedforward import AT_REST, ON
@@ -404,7 +404,7 @@ def _asked(form: Form, compile_user: Compiler) -> Asked:
     places = layout(form)
     refer = _referring(form, compile_user)
     model = _modelling(form, compile_user)
-    laws = by_channel([law(form, law_at, compile_user) for law_at in places.laws])
+    laws = by_channel([channel_law(form, law_at, compile_user) for law_at in places.laws])
 
     @inlined
     def motion(view, i, k, t):
@@ -492,7 +492,7 @@ def _measuring_all(form: Form, compile_user: Compiler) -> Any:
         settings = settings_in(row, 0)
         for i in range(size):
             work[work_at.measured + i] = 0.0
-        address = place(work) + 8 * work_at.measured
+        address = address_of(work) + 8 * work_at.measured
         y = begin_measurement(address, t, settings.period, settings.uses_model, 0, n, driven)
         nominal_numbers = values(row, row_at.nominal)
         xs = array_in(work, work_at.seen_x, n)

@@ -13,7 +13,16 @@ from typing import Any
 
 from smc_mujoco.analysis.engine.form import SETTING, Form, layout
 from smc_mujoco.common import fingerprint
-from smc_mujoco.common.jit import SIGNATURE, Key, call, compiled, inlined, integers, place, pointer
+from smc_mujoco.common.jit import (
+    SIGNATURE,
+    Key,
+    address_of,
+    call,
+    compiled_cfunc,
+    inlined,
+    integers,
+    pointer,
+)
 from smc_mujoco.simulation import philox
 
 AHEAD = 64  # readings, chosen
@@ -30,7 +39,7 @@ def drawn(view, i, j):
     return philox.normals(view.row[SETTING.seed], i, philox.MEASUREMENT, j)
 
 
-def size(form: Form) -> int:
+def drawn_size(form: Form) -> int:
     """Return how many numbers of the state `drawn_ahead` takes."""
     return LISTS + KEPT * form.n if form.noise else 0
 
@@ -50,7 +59,7 @@ def drawn_ahead(form: Form) -> Any:
         seed = row[SETTING.seed]
         first = j - j % AHEAD
         if work[list_at + 1] != first + 1.0 or work[list_at] != seed:
-            call(int(row[address]), int(seed), i, first, place(work) + 8 * first_place)
+            call(int(row[address]), int(seed), i, first, address_of(work) + 8 * first_place)
             work[list_at] = seed
             work[list_at + 1] = first + 1.0
         pair = list_at + 2 + 2 * (j - first)
@@ -62,7 +71,7 @@ def drawn_ahead(form: Form) -> Any:
 @functools.cache
 def drawing() -> Any:
     """Return `_draw` as a C function; it is compiled once for all forms."""
-    return compiled(SIGNATURE, _draw, Key(__name__, fingerprint.now(_draw)))
+    return compiled_cfunc(SIGNATURE, _draw, Key(__name__, fingerprint.now(_draw)))
 
 
 def _draw(seed, channel, first, state):

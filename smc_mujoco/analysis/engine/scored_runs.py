@@ -126,7 +126,7 @@ class ScoredRuns:
         of_disturbances = map(type, case.resolved.disturbance)
         functions = kind.key_of(case), *of_disturbances
         if functions not in self.compiles:
-            self.compiles[functions] = prepare.why_not(case)
+            self.compiles[functions] = prepare.why_not_compiled(case)
         if why := self.compiles[functions]:
             return None, why
         return kind, ""

@@ -57,7 +57,7 @@ def summed_up(name: str) -> bool:
     return name in WRITTEN_OUT or _fold(name) is not None
 
 
-def names() -> list[str]:
+def engine_metrics() -> list[str]:
     """Return the names of all metrics that the engine has."""
     return [*WRITTEN_OUT, *filter(_fold, CATALOGUE)]
 

@@ -259,7 +259,7 @@ class _OnProcessor:
     """The callback on MuJoCo Warp's processor device, for tests."""
 
     def __init__(self, runs: WorldRuns, rows: Array, data: Any):
-        self.control = world_callback.compiled(runs.form)
+        self.control = world_callback.compiled_callback(runs.form)
         self.theirs = [data.qpos, data.qvel, data.ctrl, data.qfrc_applied]
         self.mine = [array.numpy().astype(float) for array in self.theirs]
         self.sizes = [array.shape[1] for array in self.mine[:3]]

@@ -200,7 +200,7 @@ def _releasing(form: Form) -> Any:
 
 
 @functools.lru_cache(maxsize=64)
-def compiled(form: Form) -> Any:
+def compiled_callback(form: Form) -> Any:
     """Return the compiled callback of worlds on the processor, (count, addresses of rows, tables,
     work, scores, qpos, qvel, ctrl and qfrc_applied, numbers of qpos, qvel and ctrl in a world).
     """

@@ -9,7 +9,7 @@ from smc_mujoco.analysis.engine.group import (
     FormGroup,
     first_of,
     form_of,
-    key,
+    group_key,
     lags,
     why_not_sampled,
 )
@@ -58,7 +58,7 @@ class WorldGroup(FormGroup):
     @staticmethod
     def key_of(scenario: Scenario) -> Hashable:
         """Return what is equal for scenarios that are worlds of one model."""
-        return key(scenario), structure(scenario)
+        return group_key(scenario), structure(scenario)
 
     def __init__(
         self, scenarios: Sequence[Scenario], metrics: Sequence[str] = (), known: Sequence[Form] = ()

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from smc_mujoco.analysis.engine.group import FormGroup, key, why_not
+from smc_mujoco.analysis.engine.group import FormGroup, group_key, why_not
 from smc_mujoco.analysis.tuning.objective import Objective
 from smc_mujoco.common.aliases import Floats, Pair
 from smc_mujoco.simulation import state
@@ -17,12 +17,12 @@ from smc_mujoco.simulation.scenario import Scenario
 
 
 def key_of(case: Scenario, device: str) -> Hashable:
-    """Return the `key` of a case if the fast engine can run it on a device, else None."""
-    return None if why_not(case, (), device) else key(case)
+    """Return the `group_key` of a case if the fast engine can run it on a device, else None."""
+    return None if why_not(case, (), device) else group_key(case)
 
 
 class Equations:
-    """The runs of cases of one `key` by the plant's equation, all candidates at once."""
+    """The runs of cases of one `group_key` by the plant's equation, all candidates at once."""
 
     def __init__(
         self,

@@ -220,7 +220,7 @@ def _putter(
     law = prepared.scenario.law
     start = int(record["law"]["parameters"])
     width = prepared.scenario.plant.driven if law.joint else 1
-    values = state.view(packed.numbers, start, (len(law.gains), width))
+    values = state.array_at(packed.numbers, start, (len(law.gains), width))
     rows = []
     for name in names:
         rows.append(list(law.gains).index(name))

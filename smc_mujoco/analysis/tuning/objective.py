@@ -138,7 +138,7 @@ class Objective:
         )
 
     def describe(self) -> Fields:
-        """Return it as JSON data, from which `restore` makes an equal one."""
+        """Return it as JSON data, from which `restored_objective` makes an equal one."""
         values = {}
         for f in dataclasses.fields(self):
             values[f.name] = getattr(self, f.name)
@@ -286,7 +286,7 @@ class Objective:
         return 2.0 * FAILURE_COST * len(self.conditions) * amplitude / self.chattering
 
 
-def restore(data: Data) -> Objective:
+def restored_objective(data: Data) -> Objective:
     """Return the objective that `Objective.describe` wrote. No file that it names is run."""
     for text in data["conditions"]:
         if ".py:" in text:
@@ -361,7 +361,7 @@ def _placed(plant: Plant | str, goal: Objective, number: int) -> list[Scenario]:
     """Return the runs of an instance, which are the same for every law but for the law: most of the
     time that a run's making takes is that of its start and its condition.
     """
-    return goal.holdout(plant, coerce.law("none"), number)
+    return goal.holdout(plant, coerce.coerced_law("none"), number)
 
 
 def _unseen(

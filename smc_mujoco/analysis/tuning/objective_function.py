@@ -118,5 +118,5 @@ def objective(
         goal = objective
     else:
         goal = find("objective", objective, OBJECTIVES)
-    task = task_of(plant, coerce.law(law), goal, 1, 0, threads, outside_theorem)
+    task = task_of(plant, coerce.coerced_law(law), goal, 1, 0, threads, outside_theorem)
     return ObjectiveFunction(task, search)

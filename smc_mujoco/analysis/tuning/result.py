@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from smc_mujoco.analysis.tuning import search_space
-from smc_mujoco.analysis.tuning.objective import Evaluation, Objective, restore
+from smc_mujoco.analysis.tuning.objective import Evaluation, Objective, restored_objective
 from smc_mujoco.answers.answer import Answer
 from smc_mujoco.answers.command import again, instead, typed
 from smc_mujoco.answers.facts import Fact, NextStep, Screen
@@ -282,11 +282,11 @@ def load_tuned(path: AnyPath, plant: Plant | None = None) -> Tuned:
             searches=tuple(map(_search_result, data["searches"])),
             law=scenario.law,
             plant=scenario.plant,
-            definition=restore(data["definition"]),
+            definition=restored_objective(data["definition"]),
         )
 
 
-def compare(tuned: Sequence[Tuned]) -> list[Tuned]:
+def compare_tunings(tuned: Sequence[Tuned]) -> list[Tuned]:
     """Return the tunings, best first. Raise ScenarioError unless all were made in the same way."""
     if not tuned:
         raise ScenarioError("cannot compare []: give a list of tunings")

@@ -199,7 +199,7 @@ def tune(
         goal = find("objective", objective, OBJECTIVES)
     replaced = {name: value for name, value in changes.items() if value is not None}
     goal = dataclasses.replace(goal, **replaced)
-    own = checked_name(coerce.law(law))
+    own = checked_name(coerce.coerced_law(law))
     task = task_of(plant, own, goal, budget, seed, threads, outside_theorem)
     task = task._replace(device=device, quick=quick)
     if why := falls(task.plant):
@@ -250,12 +250,12 @@ def _searched_elsewhere(
     """Have workers make searches side by side, and yield the number and the result of each."""
     calls = [task.call(i, failure) for i in missing]
     with opened(executor) as pool:
-        for k, result in called(pool, searched, calls):
+        for k, result in called(pool, search_task, calls):
             yield missing[k], result
             shown.advance(task.size)
 
 
-def searched(
+def search_task(
     plant: Plant,
     law: Component,
     goal: Objective,
@@ -336,7 +336,7 @@ class TuningTask(NamedTuple):
     def file(self, i: int, folder: AnyPath, draw: int = 0) -> "CachedResult[SearchResult]":
         """Return the file of search i in a folder."""
         depends = (
-            run_key.key(self.first_case(i)),
+            run_key.run_key(self.first_case(i)),
             self.goal.describe(),
             self.codes(),
             self.budget,
@@ -541,13 +541,13 @@ def _refuse_mixed_commands(case: Scenario) -> None:
     )
 
 
-def why_not(plant: Plant, law: Component | Template, goal: Objective) -> str:
+def why_not_tuned(plant: Plant, law: Component | Template, goal: Objective) -> str:
     """Return why a law cannot be tuned on a plant, or "".
 
     Raise BrokenLawError if it cannot even be run there.
     """
     try:
-        task_of(plant, coerce.law(law), goal, BUDGET, 0, None)
+        task_of(plant, coerce.coerced_law(law), goal, BUDGET, 0, None)
     except BrokenLawError:
         raise
     except ScenarioError as error:

@@ -107,7 +107,7 @@ def tune(
 
     options.check_files(out)
     terminal = Terminal(json)
-    start = options.starts(x0)
+    start = options.parsed_starts(x0)
     tested = options.conditions(condition) or None
     tuned = search.tune(
         plant,
@@ -193,8 +193,8 @@ def margins(
     options.check_files(None, *files(figure))
     usual = QUICK_MARGINS if quick else {"plants": PLANTS, "laws": gain_sets.LAWS, "kinds": KINDS}
     machines = list(map(as_plant, options.plants(plants, usual["plants"])))
-    chosen = options.laws(law, usual["laws"])
-    kind = options.names(kinds, usual["kinds"])
+    chosen = options.parsed_laws(law, usual["laws"])
+    kind = options.parsed_names(kinds, usual["kinds"])
     with bar("margins") as progress:
         results = search(
             machines,
@@ -205,7 +205,7 @@ def margins(
             threads,
             progress.reached,
             condition,
-            options.starts(x0),
+            options.parsed_starts(x0),
             device,
         )
     terminal.answer(results, full)
@@ -338,7 +338,7 @@ def sensitivity(
     terminal = Terminal(json)
     over = _within(disturbance, bound)
     options.check_files(None, *files(figure))
-    chosen = options.law(law)
+    chosen = options.parsed_law(law)
     scenario = case(as_plant(plant), chosen, condition, duration, gains)
     result = sensitivity(scenario, over, metric, points, seed, threads, True, device)
     terminal.answer(result, full)
@@ -401,12 +401,12 @@ def _attacked_cases(
     if plant in rigs():
         rig = find_rig(plant)
         gain_set = "default" if gains == "tuned" else gains  # the laws of a rig have gains for it
-        chosen = options.laws(law, of_rig=rig.laws) or rig.laws
+        chosen = options.parsed_laws(law, of_rig=rig.laws) or rig.laws
         cases = []
         for attacked in chosen:
             cases.append(ensemble.runs(rig, [attacked], 1, gain_set, duration))
         return cases
-    chosen = options.laws(law, gain_sets.LAWS)
+    chosen = options.parsed_laws(law, gain_sets.LAWS)
     machine = as_plant(plant)
     cases = []
     for scenario in _cases(machine, chosen, condition, duration, gains):

@@ -87,7 +87,7 @@ def list_(
     elif name is not None and name not in KINDS:
         with importing():
             from smc_mujoco.cli import law_pages
-            from smc_mujoco.mechanisms.plant import catalogue as plants
+            from smc_mujoco.mechanisms.plant import plant_catalogue as plants
             from smc_mujoco.metrics.catalogue import CATALOGUE
             from smc_mujoco.simulation.conditions import NAMED
             from smc_mujoco.studies.scene import scenes
@@ -98,7 +98,7 @@ def list_(
     elif name is None and (needs is not None or plant is not None):
         with importing():
             from smc_mujoco.cli import law_pages
-        law_pages.print_suitable(options.names(needs), plant, terminal)
+        law_pages.print_suitable(options.parsed_names(needs), plant, terminal)
     elif name is None and not full and json is None and not names.of_others():
         _print_names(terminal, names.names())
     else:
@@ -132,7 +132,7 @@ def _print_all(
         from smc_mujoco.cli import law_pages, tables
         from smc_mujoco.common.tabular import of_fields
         from smc_mujoco.mechanisms.named import as_plant
-        from smc_mujoco.mechanisms.plant import catalogue as plants
+        from smc_mujoco.mechanisms.plant import plant_catalogue as plants
         from smc_mujoco.metrics.catalogue import metrics
         from smc_mujoco.simulation.conditions import DURATION, NAMED, applicable
         from smc_mujoco.studies import scene

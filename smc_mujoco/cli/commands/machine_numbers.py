@@ -182,7 +182,7 @@ def identify(
     identified = identification.identify(
         machine,
         files,
-        options.names(names) or None,
+        options.parsed_names(names) or None,
         held_out=held_out,
         columns=renamed,
         condition=condition,
@@ -277,7 +277,7 @@ def excitation(
     options.check_files(None, *files(figure), out and with_ending(out, ".csv"))
     motions = exciting.excitation(
         machine,
-        options.names(names),
+        options.parsed_names(names),
         u_max=u_max,
         v_max=v_max,
         amplitude=amplitude,

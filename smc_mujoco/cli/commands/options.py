@@ -244,7 +244,7 @@ X0Exactly = Annotated[
 ]
 
 
-def names(texts: str | Sequence[str] | None, default: Sequence[str] = ()) -> list[str]:
+def parsed_names(texts: str | Sequence[str] | None, default: Sequence[str] = ()) -> list[str]:
     """Return the names in a text such as "a,b", or in several, or the default if there is none."""
     if texts is None:
         return list(default)
@@ -261,7 +261,7 @@ def plants(texts: Sequence[str] | None, default: Sequence[str] = ()) -> list[str
     """Return the names of plants in texts, or the default; a law's name is refused."""
     from smc_mujoco.control.law import all_laws
 
-    chosen = names(texts, default)
+    chosen = parsed_names(texts, default)
     for name in chosen:
         if name in all_laws():
             raise ScenarioError(f"{name!r} is a law, not a plant: give it as --law {name}")
@@ -280,7 +280,7 @@ def pairs(text: str | None, option: str, example: str) -> dict[str, str]:
     None.
     """
     values = {}
-    for pair in names(text):
+    for pair in parsed_names(text):
         name, _, value = map(str.strip, pair.partition("="))
         if not (name and value):
             raise ScenarioError(f"{option} {shown(pair)} cannot be read: write it as {example}")
@@ -303,7 +303,7 @@ def numbers(text: str | None, option: str, example: str) -> dict[str, float]:
     return values
 
 
-def laws(
+def parsed_laws(
     texts: str | Sequence[str] | None, default: Sequence[str] = (), of_rig: "Sequence[Law]" = ()
 ) -> "list[str | Law]":
     """Return the laws in texts, see `control.from_text`.
@@ -314,16 +314,16 @@ def laws(
 
     rig_laws = {law.name: [law] for law in of_rig}
     chosen = []
-    for text in names(texts, default):
-        chosen += rig_laws.get(text) or from_text.laws(text)
+    for text in parsed_names(texts, default):
+        chosen += rig_laws.get(text) or from_text.laws_of_text(text)
     return chosen
 
 
-def law(text: str) -> "str | Law":
+def parsed_law(text: str) -> "str | Law":
     """Return the one law in a text. The name of a law of the library stays a name."""
     from smc_mujoco.control import from_text
 
-    laws_of_text = from_text.laws(text)
+    laws_of_text = from_text.laws_of_text(text)
     if len(laws_of_text) == 1:
         return laws_of_text[0]
     return from_text.law(text)
@@ -337,7 +337,7 @@ def conditions(texts: Sequence[str] | None) -> "list[named.Condition]":
 
     chosen = []
     for text in texts or ():
-        for part in [text] if ":" in text else names(text):
+        for part in [text] if ":" in text else parsed_names(text):
             chosen += find_conditions(part)
     return chosen
 
@@ -357,10 +357,10 @@ def compared_laws(
         if gains == "tuned":
             return gain_sets.general()
         return gain_sets.general_laws(plants or PLANTS, gains)
-    return laws(texts)
+    return parsed_laws(texts)
 
 
-def starts(x0: str | None) -> "Starts | None":
+def parsed_starts(x0: str | None) -> "Starts | None":
     """Return the initial states of the option --x0; None for each plant's own."""
     from smc_mujoco.simulation import grid
 

@@ -80,7 +80,7 @@ def rig(
             f"{len(files or ())} records of {name}: give one file; smc-mujoco identify takes many"
         )
     else:
-        chosen_sets = options.names(sets)
+        chosen_sets = options.parsed_names(sets)
         _repeat(name, files[0], named, chosen_sets, start, duration, figure, film, terminal)
     terminal.finish()
 
@@ -89,9 +89,11 @@ def _list(terminal: Terminal) -> None:
     """List the rigs."""
     with importing():
         from smc_mujoco.common.tabular import of_fields
-        from smc_mujoco.identification.published_rig import catalogue
+        from smc_mujoco.identification.published_rig import rig_catalogue
 
-    terminal.print(of_fields("Rigs", {name: entry.label for name, entry in catalogue().items()}))
+    terminal.print(
+        of_fields("Rigs", {name: entry.label for name, entry in rig_catalogue().items()})
+    )
 
 
 def _repeat(

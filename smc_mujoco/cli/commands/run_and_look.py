@@ -54,7 +54,7 @@ def run(
 
     endings = () if export is None else formats(export)
     path = scenes.find(name)
-    scene = scenes.read(path)
+    scene = scenes.read_scene(path)
     if seed is not None:
         scene = scene.seeded(seed)
     terminal = Terminal(json)
@@ -173,6 +173,6 @@ def view(
     if machine.endswith(".py"):
         from smc_mujoco.studies import scene as scenes
 
-        scene = scenes.read(scenes.find(machine))
+        scene = scenes.read_scene(scenes.find(machine))
         viewed = list(scene.conditions[scene.film].values())[:2]
-    show_view(viewed, options.laws(law), port, browser, record)
+    show_view(viewed, options.parsed_laws(law), port, browser, record)

@@ -111,19 +111,19 @@ def which(
     terminal = Terminal(json)
     length = QUICK_MINUTES if quick and minutes is None else minutes
     if film:
-        from smc_mujoco.draw.film.film import missing
+        from smc_mujoco.draw.film.film import missing_for_film
 
-        if why := missing():
+        if why := missing_for_film():
             terminal.note(f"{why}; with it, the same command makes the film, also later", wrap=True)
             film = False
     recommendation = recommend(
         plant,
         options.conditions(condition) or None,
         needs,
-        options.laws(law) or None,
+        options.parsed_laws(law) or None,
         seeds,
         duration,
-        options.starts(x0),
+        options.parsed_starts(x0),
         out,
         quick,
         threads,
@@ -345,9 +345,9 @@ def compare(
     terminal = Terminal(json)
     shared = {
         "out": out,
-        "metrics": options.names(metrics, METRICS),
+        "metrics": options.parsed_names(metrics, METRICS),
         "duration": duration,
-        "starts": options.starts(x0),
+        "starts": options.parsed_starts(x0),
         "defaults": defaults,
         "searches": searches,
         "relevant": relevant,
@@ -398,8 +398,8 @@ def _compare_on_rig(
     from smc_mujoco.identification.published_rig import rig
 
     machine = rig(name)
-    chosen = options.laws(law, of_rig=machine.laws) or None
-    table, boards, candidates = ensemble.compare(machine, chosen, seeds, **shared)
+    chosen = options.parsed_laws(law, of_rig=machine.laws) or None
+    table, boards, candidates = ensemble.compare_on_ensemble(machine, chosen, seeds, **shared)
     terminal.answer(boards, full)
     for candidate in candidates:
         terminal.note(f"{candidate.law} {candidate.remark}".strip(), wrap=True)

@@ -13,7 +13,7 @@ import numpy as np
 
 from smc_mujoco.common.aliases import Array
 from smc_mujoco.draw.film.arrows import MAX_BLOW, Arrow
-from smc_mujoco.mechanisms.plant import Plant, catalogue
+from smc_mujoco.mechanisms.plant import Plant, plant_catalogue
 
 # Numbers of presentation here are chosen. An arrow's length is stated for the longest one.
 HINGE_LENGTH = 0.425  # of the pendulum's length
@@ -77,7 +77,7 @@ def mounts(
         thick = min(SLIDE_THICKNESS, MAX_RAIL_SHARE * rail)
         slide = Mount(0, SLIDE_LENGTH * rail, thick, front)
         turning = CHAIN_FACTOR if plant.n > 1 else 1.0
-        usual = catalogue().get(plant.name)
+        usual = plant_catalogue().get(plant.name)
         if plant.n == 1 and "l" in plant.parameters and usual:  # as large on any rod
             turning = usual.parameters["l"] / plant.parameters["l"]
         hinge = slide._replace(unit=turning)

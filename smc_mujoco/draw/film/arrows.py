@@ -208,7 +208,7 @@ def rgba(colour: str, opacity: float = 1.0) -> tuple[float, ...]:
     return (*shade.tolist(), opacity)
 
 
-def key(traces: Sequence[Trace], scales: Mapping[ChannelGroup, Scale]) -> list[str]:
+def scale_words(traces: Sequence[Trace], scales: Mapping[ChannelGroup, Scale]) -> list[str]:
     """Return what the longest arrow of a picture is, such as "→ u 6 N"; or how much of a network
     is shown, which has no arrows.
 

@@ -236,10 +236,10 @@ def film(
     frames = Frames(traces, labels, title, size, fps, speed, camera, at, span)
     if path is None:
         return frames
-    return write(frames, Path(path))
+    return write_film(frames, Path(path))
 
 
-def write(frames: Frames, path: Path) -> Path:
+def write_film(frames: Frames, path: Path) -> Path:
     """Write frames to a file, as its ending tells, and return its path."""
     images = pictures(frames, ahead=True)
     clear_abandoned(path)
@@ -282,9 +282,11 @@ def _write_png(frames: Frames, made: Iterator[Array], part: Path) -> None:
 WRITERS = {".mp4": _write_mp4, ".webp": _write_webp, ".png": _write_png}
 
 
-def missing() -> str | None:
+def missing_for_film() -> str | None:
     """Return None if a film can be written, else one sentence that says why not and what to do."""
-    return gl.missing() or extras.missing("film", "no film: it", "mediapy", "imageio_ffmpeg")
+    return gl.missing_renderer() or extras.missing_extra(
+        "film", "no film: it", "mediapy", "imageio_ffmpeg"
+    )
 
 
 def _checked_size(size: Iterable[int]) -> tuple[int, int]:
@@ -314,13 +316,13 @@ def pictures(
     size = _checked_size(frames.size)
     if len(runs.traces) > MAX_MACHINES:
         raise ScenarioError(f"{len(runs.traces)} machines in one film: show at most {MAX_MACHINES}")
-    if why := gl.missing():
+    if why := gl.missing_renderer():
         raise ScenarioError(why)
     clock = frames.clock
     scales = arrows.scales(runs.traces)
     tracks = tracks_at(clock, runs, scales)
     between()
-    keys = [arrows.key(runs.traces, scales)]
+    keys = [arrows.scale_words(runs.traces, scales)]
     if clock.close:
         keys.append([f"last periods, deflections × {clock.close.factor:g}"])
     lines = head_lines(runs, size, frames.title, keys)

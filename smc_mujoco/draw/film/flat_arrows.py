@@ -108,10 +108,12 @@ def write_numbers(
         key = arrow.words, arrow.rgba
         if key not in said:
             said.add(key)
-            write(image, arrow, line, scale, taken)
+            write_number(image, arrow, line, scale, taken)
 
 
-def write(image: Image.Image, arrow: Arrow, line: Array, scale: float, taken: list[Array]) -> None:
+def write_number(
+    image: Image.Image, arrow: Arrow, line: Array, scale: float, taken: list[Array]
+) -> None:
     """Write the number of an arrow along a line, (m, 2) px, where there is room in the picture:
     beyond its free end, over the arrow or beside a steep one, or before its other end; else where
     room is nearest to it.

@@ -58,7 +58,7 @@ def close(boxes: Array, low: Array, high: Array, far: float) -> Array:
     return boxes[inside & (extent < far)]
 
 
-def within(boxes: Array, low: Array, high: Array) -> Array:
+def clipped_boxes(boxes: Array, low: Array, high: Array) -> Array:
     """Return the parts of boxes, (boxes, 8, 3) m, that are in the box between two corners, (3,)
     m.
     """
@@ -171,7 +171,7 @@ class Puppet:
         if chosen is None:
             begun = layout.posed(self.model, plant.x0)
             links = np.flatnonzero(self.moved & (self.model.geom_group < world.DRAWN_GROUPS))
-            chosen = viewpoint.view(self.model, begun, self.ids, links)
+            chosen = viewpoint.best_angles(self.model, begun, self.ids, links)
         return camera.turn(*chosen)
 
     @property
@@ -345,7 +345,7 @@ class Puppet:
             ends = points.min(axis=0) - around, points.max(axis=0) + around
             moved = zip(course.rest, places, strict=False)
             rest = np.concatenate([boxes - origin for boxes, origin in moved])
-            points = np.concatenate([points, within(rest, *ends).reshape(-1, 3)])
+            points = np.concatenate([points, clipped_boxes(rest, *ends).reshape(-1, 3)])
             every_place = np.concatenate(course.places)
             lowest = float(every_place[:, 2].min())
             height = max(0.0, -lowest)
@@ -389,11 +389,11 @@ class Puppet:
             tall, whole_height = (np.ptp(cloud @ turn[:, 1]) for cloud in (reached, points))
             room = max(0.0, MOST_HEIGHT * tall - whole_height) / max(turn[2, 1], MIN_UPRIGHT)
             near[2] = np.inf
-            standing = within(standing, low - near, high + near)
+            standing = clipped_boxes(standing, low - near, high + near)
             stand = min(room, low[2] - standing[..., 2].min(initial=low[2]))
             near[2] = room - stand
         if self.scenario.plant.tip or not on_stage:
-            standing = within(standing, low - (*near[:2], stand), high + near)
+            standing = clipped_boxes(standing, low - (*near[:2], stand), high + near)
         if on_stage and self.slides.all():  # of a cart the rail, not its feet nor what is behind it
             stand = world.CUT_MARGIN * size
             least = low[1:] - (0.0, stand)

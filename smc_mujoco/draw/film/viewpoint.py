@@ -26,7 +26,7 @@ INSIDE = 0.5  # of a geom's box, from its middle to the corners at which one loo
 START = 10.0  # of the model's extent, from there to where a ray begins
 
 
-def view(
+def best_angles(
     model: mujoco.MjModel, data: mujoco.MjData, joints: Array, links: Array
 ) -> tuple[float, float]:
     """Return azimuth and elevation from which the motion of some joints is seen best, degrees.
@@ -40,7 +40,7 @@ def view(
     """
     own = models_camera(model)
     if own:
-        motion = shown(data, joints, own)
+        motion = share_seen(data, joints, own)
         share = motion * visible(model, data, links, own)
         if share >= ENOUGH:
             return own
@@ -52,7 +52,7 @@ def view(
     rated = []
     for azimuth, elevation in itertools.product(AZIMUTHS.tolist(), ELEVATIONS):
         angles = azimuth, elevation
-        motion = round(shown(data, joints, angles), 2)
+        motion = round(share_seen(data, joints, angles), 2)
         rated.append((-motion, abs(azimuth - FRONT), angles))
     best = FRONT, LOWEST
     most = -1.0
@@ -83,7 +83,7 @@ def models_camera(model: mujoco.MjModel) -> tuple[float, float] | None:
     return float(azimuth), min(float(elevation), LOWEST)
 
 
-def shown(data: mujoco.MjData, joints: Array, angles: tuple[float, float]) -> float:
+def share_seen(data: mujoco.MjData, joints: Array, angles: tuple[float, float]) -> float:
     """Return how much of the motion of hinges and slides is across a view, 0 .. 1: their mean.
 
     A hinge that points at the camera counts 1, and so does a slide that moves across the view.

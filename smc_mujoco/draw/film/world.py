@@ -89,7 +89,7 @@ def compose(
             break
     spec.worldbody.add_camera(name="film", fovy=camera.FOVY)
     spec.stat.meansize = 0.1
-    return mjcb.compiled(spec)
+    return mjcb.compiled_spec(spec)
 
 
 def strip(machine: mujoco.MjSpec, *surroundings) -> None:

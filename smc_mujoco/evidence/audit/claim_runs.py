@@ -31,7 +31,7 @@ from smc_mujoco.evidence.audit.verdict import Check, Threshold, check
 from smc_mujoco.metrics.catalogue import metrics
 from smc_mujoco.simulation.conditions import DURATION, Condition
 from smc_mujoco.simulation.run import stream
-from smc_mujoco.simulation.run_key import Hashes, key
+from smc_mujoco.simulation.run_key import Hashes, run_key
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import ARRAYS, Trace
 from smc_mujoco.studies.batches import result_columns
@@ -268,7 +268,7 @@ class ClaimRuns:
         plants: Hashes = {}
         keyed = []
         for scenario in scenarios:
-            keyed.append((key(scenario.named(None), plants=plants), scenario))
+            keyed.append((run_key(scenario.named(None), plants=plants), scenario))
         return keyed
 
     def traced(self, scenarios: Mapping[Name, Scenario]) -> dict[Name, Trace]:

@@ -24,7 +24,7 @@ from smc_mujoco.common.files import read_json, reading, sealed, unsealed
 from smc_mujoco.common.version import __version__
 from smc_mujoco.evidence.audit.paper import TEXT_FIELDS, Paper
 from smc_mujoco.evidence.audit.verdict import totals
-from smc_mujoco.mechanisms.plant import catalogue as plants
+from smc_mujoco.mechanisms.plant import plant_catalogue as plants
 from smc_mujoco.simulation.run_key import condition, portable_key
 from smc_mujoco.simulation.scenario import Scenario
 
@@ -78,7 +78,7 @@ def document(audit: Any) -> Fields:
     return sealed(data)
 
 
-def check(path: str | Path) -> Fields:
+def read_sealed(path: str | Path) -> Fields:
     """Return the evidence in a file, or raise ScenarioError if its seal is broken."""
     with reading(
         path, "file of evidence", "give one that `smc-mujoco claims --evidence FILE.json` wrote"

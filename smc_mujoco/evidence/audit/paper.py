@@ -30,10 +30,10 @@ from smc_mujoco.common.data import keyword_dataclass
 from smc_mujoco.common.errors import MAX_ITEMS, ScenarioError, find, shown, unknown, whole, words
 from smc_mujoco.common.files import as_path, reading, replacing
 from smc_mujoco.common.frozen import frozen
-from smc_mujoco.common.registry import KINDS, Catalogue, added, source, warn
+from smc_mujoco.common.registry import KINDS, Catalogue, added, module_spec, warn
 from smc_mujoco.control import gain_sets
 from smc_mujoco.control.component import Component, Template
-from smc_mujoco.control.law import catalogue as laws_known
+from smc_mujoco.control.law import law_catalogue as laws_known
 from smc_mujoco.control.source import STUDY
 from smc_mujoco.evidence.audit.verdict import (
     DERIVED,
@@ -45,8 +45,8 @@ from smc_mujoco.evidence.audit.verdict import (
 )
 from smc_mujoco.mechanisms.named import from_text
 from smc_mujoco.mechanisms.plant import Plant
-from smc_mujoco.mechanisms.plant import catalogue as plants_known
 from smc_mujoco.mechanisms.plant import plant as find_plant
+from smc_mujoco.mechanisms.plant import plant_catalogue as plants_known
 from smc_mujoco.simulation.condition_text import read_fields
 from smc_mujoco.simulation.conditions import NAMED as CONDITIONS
 from smc_mujoco.simulation.conditions import Condition, condition, find_condition
@@ -176,7 +176,9 @@ class Paper:
             if law in self.laws:
                 return self.bound(law, {})
             has_sets = law in (*gain_sets.COMPARED, *gain_sets.STUDY_ALIASES)
-            return gain_sets.law(self.plant(plant), law, gains if has_sets else "default")
+            return gain_sets.law_with_gains(
+                self.plant(plant), law, gains if has_sets else "default"
+            )
         general = of_set.get("", {}).get(law, {})
         of_plant = of_set.get(plant, {}).get(law, {})
         values = {**general, **of_plant}
@@ -223,7 +225,7 @@ Home = tuple[Path, str]  # a paper's folder, and the name under which it is impo
 
 
 @functools.cache
-def catalogue() -> Catalogue[Home]:
+def paper_catalogue() -> Catalogue[Home]:
     """Return name -> home of every paper that ships or comes with another package."""
     of_suite = {}
     for name, folder in shipped().items():
@@ -233,7 +235,7 @@ def catalogue() -> Catalogue[Home]:
 
 def _of_package(point: EntryPoint) -> Home:
     """Return the home of the paper that an entry point of another package names."""
-    spec = source(point)
+    spec = module_spec(point)
     if not spec.submodule_search_locations:
         raise ScenarioError(f"{spec.origin} is no folder: give {KINDS[point.group][1]}")
     return Path(next(iter(spec.submodule_search_locations))), point.module
@@ -241,7 +243,7 @@ def _of_package(point: EntryPoint) -> Home:
 
 def paper(which: str | Path) -> Paper:
     """Return a paper by its name in `smc-mujoco claims --papers`, or from its folder."""
-    paper_homes = catalogue()
+    paper_homes = paper_catalogue()
     if isinstance(which, str) and which in paper_homes:
         return _read_once(*paper_homes[which])
     folder = as_path(which, "the paper")
@@ -260,11 +262,11 @@ def papers() -> dict[str, Paper]:
     order.
     """
     paper_by_name: dict[str, Paper] = {}
-    for key, home in catalogue().items():
+    for key, home in paper_catalogue().items():
         try:
             paper_by_name[key] = _read_once(*home)
         except ScenarioError as error:
-            if not (package := catalogue().package(key)):
+            if not (package := paper_catalogue().package(key)):
                 raise
             warn(f"package {package!r}: its paper {key!r}: {error}")
     return paper_by_name

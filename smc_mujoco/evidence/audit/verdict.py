@@ -95,10 +95,10 @@ class Check(NamedTuple):
         """The value, and the relation with its limit, with as many digits as tell the two apart; a
         value that fails because it is its limit is "equal".
         """
-        value = measured(self.value, self.what, self.limit)
+        value = digits_of(self.value, self.what, self.limit)
         if self.value == self.limit and not self.holds:
             value = f"{value}, equal"
-        return value, f"{self.relation} {measured(self.limit, self.what, self.value)}"
+        return value, f"{self.relation} {digits_of(self.limit, self.what, self.value)}"
 
     @property
     def slack(self) -> float:
@@ -139,7 +139,7 @@ def check(what: str, value: float, relation: str, limit: float, sentence: str = 
     )
 
 
-def measured(value: float, what: str, *others: float) -> str:
+def digits_of(value: float, what: str, *others: float) -> str:
     """Return three significant digits, or as many as tell it from others; "none" for NaN, and
     "never" for an infinite time.
     """
@@ -354,7 +354,7 @@ class Claim(Statement):
         ends = []
         for end in middle.split(" to "):
             ends += [float(end) - check.limit, float(end) + check.limit]
-        value = measured(self.beside[gains][what], what, *ends)
+        value = digits_of(self.beside[gains][what], what, *ends)
         return f"{what} = {value} ({middle}{width} asked)"
 
 
@@ -379,7 +379,7 @@ class Claims(list[Claim]):
         return Tabular(headings=heads, rows=rows, name_columns=len(heads))
 
     def _repr_html_(self) -> str:
-        return dataclasses.replace(self.table, notes=[summary(self)])._repr_html_()
+        return dataclasses.replace(self.table, notes=[totals_line(self)])._repr_html_()
 
 
 def totals(claims: Sequence[Claim]) -> dict[str, int]:
@@ -392,7 +392,7 @@ def totals(claims: Sequence[Claim]) -> dict[str, int]:
     return counts
 
 
-def summary(claims: Sequence[Claim]) -> str:
+def totals_line(claims: Sequence[Claim]) -> str:
     """Return a line: the totals of the paper's own sentences and what was read, then the verdicts
     on the rest.
     """

@@ -14,7 +14,7 @@ from smc_mujoco.cli.console import Terminal
 from smc_mujoco.common.tabular import Cell, Tabular, of_fields
 from smc_mujoco.common.text import capital
 from smc_mujoco.evidence.audit import verdict as verdicts
-from smc_mujoco.evidence.audit.verdict import REFUTED, SUPPORTED, Claim, Claims, measured
+from smc_mujoco.evidence.audit.verdict import REFUTED, SUPPORTED, Claim, Claims, digits_of
 
 MAX_NAMED = 8  # claims whose checks the next step shows; chosen
 CHECKED = {
@@ -35,7 +35,7 @@ def print_claims(claims: Claims, terminal: Terminal, named: bool, full: bool) ->
             _print_claim(claim, terminal)
     else:
         terminal.print(claims.table)
-    terminal.print(Text(f"{capital(verdicts.summary(claims))}."), highlight=False)
+    terminal.print(Text(f"{capital(verdicts.totals_line(claims))}."), highlight=False)
     if any(len(claim.verdicts) > 1 for claim in claims):
         terminal.print(Text(verdicts.over_gains(claims)), highlight=False)
 
@@ -70,6 +70,6 @@ def _print_claim(claim: Claim, terminal: Terminal) -> None:
     for name, verdict in claim.verdicts.items():
         rows = [(CHECKED[check.holds], check.what, *check.texts) for check in claim.checks(name)]
         for what, value in claim.beside[name].items():
-            rows.append((Cell(""), what, measured(value, what), ""))
+            rows.append((Cell(""), what, digits_of(value, what), ""))
         title = f"{name} gains: {verdict}"
         terminal.print(Tabular(headings=("",) * 4, rows=rows, title=title, name_columns=2), "")

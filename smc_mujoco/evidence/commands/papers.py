@@ -95,7 +95,7 @@ def claims(
     if listed:
         _list_claims(about, terminal)
         return
-    sets = None if gains is None else options.names(gains)
+    sets = None if gains is None else options.parsed_names(gains)
     writable(evidence and with_ending(evidence, ".json"))
     with bar("claims") as drawn:
         done = audit(about, ids or None, sets, quick, threads, report=drawn.reached)
@@ -134,7 +134,7 @@ def _papers(listed: bool, new: Path | None, check: Path | None, terminal: Termin
     if new:
         terminal.wrote(*paper.new(new))
     if check:
-        data = evidence.check(check)
+        data = evidence.read_sealed(check)
         counted = []
         for verdict, count in data["counts"].items():
             counted.append(f"{count} {verdict}")
@@ -145,6 +145,6 @@ def _papers(listed: bool, new: Path | None, check: Path | None, terminal: Termin
         rows = {}
         for name, entry in paper.papers().items():
             line = f"{entry.authors}: {entry.title} ({entry.contents})"
-            rows[name] = tables.with_package(line, paper.catalogue().package(name))
+            rows[name] = tables.with_package(line, paper.paper_catalogue().package(name))
         terminal.print(of_fields("Papers, for smc-mujoco claims --paper", rows))
     terminal.finish()

@@ -81,7 +81,7 @@ def compiler() -> list[str]:
         return [command]
 
 
-def compiled(
+def compiled_library(
     rest: Sequence[str], target: Path, name: str, timeout: float
 ) -> subprocess.CompletedProcess[str]:
     """Compile a shared library within a time, s, from the files and flags in `rest`.
@@ -120,7 +120,7 @@ def library(
         )
     macros = [f'-DSMC_SOURCE="{path}"', f"-DSMC_SYMBOL={symbol}", *LAYOUT_FLAGS, "-I", str(FOLDER)]
     rest = [*SYMBOLIC_FLAGS, *STRICT_FLAGS, *macros, str(FOLDER / "glue.c"), *flags]
-    done = compiled(rest, target, source.name, timeout)
+    done = compiled_library(rest, target, source.name, timeout)
     if done.returncode or not target.exists():
         raise ScenarioError(_sentence(source, symbol, done.stderr))
     return target, WARNING.findall(done.stderr)

@@ -15,11 +15,11 @@ from smc_mujoco.common.errors import ScenarioError, find, shown, whole
 from smc_mujoco.common.jit import AtAddress
 from smc_mujoco.common.version import __version__
 from smc_mujoco.control.component import Component, Template, gain_at, gain_text
-from smc_mujoco.control.law import FREE_BODY, all_laws, catalogue
+from smc_mujoco.control.law import FREE_BODY, all_laws, law_catalogue
 from smc_mujoco.control.laws import observer_free_q15 as q15
 from smc_mujoco.exchange.c import body, build, compensation
 from smc_mujoco.exchange.c.compensation import Compensate
-from smc_mujoco.exchange.c.translation.c_text import MATH, plain, rows
+from smc_mujoco.exchange.c.translation.c_text import MATH, c_name, wrapped_lines
 from smc_mujoco.exchange.c.translation.functions import translate
 from smc_mujoco.exchange.c.translation.python_source import Untranslatable
 from smc_mujoco.exchange.c.translation.values import JOINTS, SLOTS
@@ -106,7 +106,7 @@ def with_head(law: Component, numbers: str, slots: int, code: str, joints: int) 
 
 def writable(law: Component | Template | str) -> Component:
     """Return a law that can be written in C."""
-    law = coerce.law(law)
+    law = coerce.coerced_law(law)
     if law.function is None:
         raise ScenarioError("law 'none' cannot be written in C: give another")
     if isinstance(law.function, AtAddress):
@@ -209,7 +209,7 @@ def includes(code: str) -> list[str]:
 
 def gain_names(component: Component) -> list[str]:
     """Return the line that names the elements of gains[]; nothing without gains."""
-    names = ", ".join(f"GAIN_{plain(name)}" for name in component.gains)
+    names = ", ".join(f"GAIN_{c_name(name)}" for name in component.gains)
     return [f"enum {{ {names} }};"] if names else []
 
 
@@ -217,9 +217,9 @@ def _in_q15(law: Component) -> Component:
     """Return the fixed-point law with the gains of a law, which must be the paper's or fixed-point
     itself.
     """
-    if law.name == "observer_free" and law.function is catalogue()["observer_free"].function:
-        law = catalogue()[Q15_LAW].bind(law.gains, warn=True)
-    if law.function is not catalogue()[Q15_LAW].function:
+    if law.name == "observer_free" and law.function is law_catalogue()["observer_free"].function:
+        law = law_catalogue()[Q15_LAW].bind(law.gains, warn=True)
+    if law.function is not law_catalogue()[Q15_LAW].function:
         raise ScenarioError(
             f"law {law.name!r} has no Q15 form: give observer_free or {Q15_LAW}, or write "
             "double or float numbers"
@@ -235,7 +235,7 @@ def _fixed_point(law: Component) -> str:
         "ON_E": word(gains["k1"] * gains["e_range"] / 8.0, 16.0),
         "ON_DE": word(gains["de_range"] / 8.0, 16.0),
         "LAM": word(gains["lam"], gains["u_range"]),
-        "TABLE": rows(list(map(str, q15.TABLE))),
+        "TABLE": wrapped_lines(list(map(str, q15.TABLE))),
     }
     text = (build.FOLDER / "q15.c").read_text(encoding="utf-8").rstrip()
     return re.sub(r"@(\w+)@", lambda match: str(words[match[1]]), text)
@@ -251,7 +251,7 @@ def _facts(law: Component, slots: int, joints: int, single: bool) -> str:
             values.append(_literal(number, single))
         if not isinstance(value, tuple):
             numbers = numbers[:1]
-        texts.append(f"{plain(name)}={' '.join(map(repr, numbers))}")
+        texts.append(f"{c_name(name)}={' '.join(map(repr, numbers))}")
     lines = []
     if joints:
         lines += [f"#define {JOINTS} {joints}", f"#define {SLOTS} {slots}"]
@@ -262,7 +262,7 @@ def _facts(law: Component, slots: int, joints: int, single: bool) -> str:
         defaults = f"const smc_real smc_law_defaults[] = {{{', '.join(values)}}};"
         lines += textwrap.wrap(defaults, 112)
     if joints:
-        lines.append(f'const char smc_law_shared[] = "{",".join(map(plain, law.shared))}";')
+        lines.append(f'const char smc_law_shared[] = "{",".join(map(c_name, law.shared))}";')
     lines.append(f"const int smc_law_memory = {slots};")
     lines.append("const int smc_law_real = sizeof(smc_real);")
     if not joints:

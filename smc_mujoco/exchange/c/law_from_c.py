@@ -210,7 +210,7 @@ def law_from_c(
     )(law)
 
 
-def check(
+def check_law_source(
     source: Path,
     gains: Mapping[str, float] | None,
     memory: int | None,

@@ -28,7 +28,7 @@ from smc_mujoco.control.law import Law
 from smc_mujoco.control.surface import Surface
 from smc_mujoco.exchange.c import compensation, export_c
 from smc_mujoco.exchange.c.compensation import Compensate
-from smc_mujoco.exchange.c.translation.c_text import plain
+from smc_mujoco.exchange.c.translation.c_text import c_name
 from smc_mujoco.exchange.c.translation.values import JOINTS
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation.model import mixer
@@ -261,14 +261,14 @@ def parameter(kind: str, part: Component, name: str, value: float, index: str = 
             limits = ", greater than 0" if gain.positive else ", at least 0"
     finite = value if math.isfinite(value) else math.copysign(MAX_DOUBLE, value)
     words = f"gain {name} of the {kind} {part.name}{limits}"
-    full = f"{kind}.{plain(name)}{index}"
+    full = f"{kind}.{c_name(name)}{index}"
     return Variable(full, "SMC_PARAMETER", words, finite, minimum, positive)
 
 
 # C
 
 
-def place(variable: str) -> str:
+def index_name(variable: str) -> str:
     """Return the name, in C, of a variable's index in the array."""
     return "SMC_AT_" + re.sub(r"\W", "_", variable)
 
@@ -284,7 +284,7 @@ def header(listed: Sequence[Variable], exported: ExportedLaw, identifier: str, t
     joints = ""
     if exported.joints:
         joints = f"\n#define {JOINTS} {exported.joints}"
-    indices = "\n".join(f"    {place(variable.name)}," for variable in listed)
+    indices = "\n".join(f"    {index_name(variable.name)}," for variable in listed)
     return f"""/* controller.h: sizes of this controller, and the indices of its variables. */
 #ifndef SMC_CONTROLLER_H
 #define SMC_CONTROLLER_H
@@ -296,7 +296,7 @@ def header(listed: Sequence[Variable], exported: ExportedLaw, identifier: str, t
 
 #define SMC_TOKEN "{token}"
 #define SMC_DT {exported.period!r} /* s */
-#define SMC_TIME {place("time")}
+#define SMC_TIME {index_name("time")}
 enum {{
 {indices}
     SMC_VARIABLES,
@@ -307,7 +307,7 @@ enum {{
 """
 
 
-def source(listed: Sequence[Variable], helpers: str, body: Iterable[str]) -> str:
+def controller_source(listed: Sequence[Variable], helpers: str, body: Iterable[str]) -> str:
     """Return controller.c: the variables, the functions `helpers`, and a last one with the
     statements `body`.
     """
@@ -350,7 +350,7 @@ def helpers(exported: ExportedLaw) -> str:
         matrix = "(void)plant, (void)w"
         add = ""
         if "C" in input_names:
-            matrix = f"const double *C = (const double *)plant + {place('C[1,1]')}"
+            matrix = f"const double *C = (const double *)plant + {index_name('C[1,1]')}"
             term = "out[i] += C[i * SMC_JOINTS + j] * w[j];"
             add = f"\n        for (int j = 0; j < SMC_JOINTS; j++) {term}"
         functions += f"""/* out = C w */
@@ -367,7 +367,7 @@ static void coriolis(void *plant, const double *w, double *out)
         source = "NAN"
         unused = "    (void)plant;\n"
         if "J" in input_names:
-            source = f"((const double *)plant)[{place('J[1,1]')} + i]"
+            source = f"((const double *)plant)[{index_name('J[1,1]')} + i]"
             unused = ""
         functions += f"""static void jacobian(void *plant, double *out)
 {{
@@ -399,7 +399,7 @@ def body(listed: Sequence[Variable], exported: ExportedLaw) -> Iterator[str]:
     def value(name: str, absent: str = "0.0") -> str:
         if name in COMMON_INPUTS | CHANNEL_INPUTS | JOINT_INPUTS and name not in input_names:
             return absent
-        return f"value[{place(name + exported.places[0])}{moved}]"
+        return f"value[{index_name(name + exported.places[0])}{moved}]"
 
     def for_each(lines: Iterable[str]) -> Iterable[str]:
         if not many:
@@ -421,7 +421,7 @@ def body(listed: Sequence[Variable], exported: ExportedLaw) -> Iterator[str]:
     if exported.of_body:
         yield "smc_errors(y.x, y.v, y.r, y.dr, y.e, y.de);"
     if many and exported.modelled and "M" in input_names:
-        first = place("M[1,1]")
+        first = index_name("M[1,1]")
         yield f"for (int j = 0; j < SMC_JOINTS * SMC_JOINTS; j++) y.M[j] = value[{first} + j];"
     if exported.surface:
         yield from _call("surface", "&y", "surface_memory")
@@ -430,7 +430,7 @@ def body(listed: Sequence[Variable], exported: ExportedLaw) -> Iterator[str]:
     if exported.compensate:
         added = value("compensation")
         yield from for_each([f"{added} = out{u};"])
-        yield f"smc_compensation(&y, value + {place('compensation' + exported.places[0])});"
+        yield f"smc_compensation(&y, value + {index_name('compensation' + exported.places[0])});"
         yield from for_each([f"out{u} += {added};"])
     yield from for_each(
         [
@@ -441,7 +441,7 @@ def body(listed: Sequence[Variable], exported: ExportedLaw) -> Iterator[str]:
         ]
     )
     if exported.actuators:
-        yield f"smc_actuators(&y, out, value + {place('control[1]')});"
+        yield f"smc_actuators(&y, out, value + {index_name('control[1]')});"
     yield "return 0;"
 
 
@@ -451,22 +451,22 @@ def _tables(listed: Sequence[Variable], exported: ExportedLaw) -> Iterator[str]:
     for kind, part in exported.parts.items():
         yield f"const double {kind}_gains[] = {{"
         for name in part.gains:
-            element = f"{kind}.{plain(name)}"
+            element = f"{kind}.{c_name(name)}"
             elements = [element]
             if kind == "law" and exported.joints:
                 elements *= exported.joints
             if element not in names:
                 elements = [element + place for place in exported.places]
             for name_in_fmu in elements:
-                yield f"    number(value[{place(name_in_fmu)}]),"
+                yield f"    number(value[{index_name(name_in_fmu)}]),"
         if not part.gains:
             yield "    0.0,"
         yield "};"
         memory = "NULL"
         if exported.code[kind][0]:
-            memory = f"&value[{place(f'{kind}.memory[1]')}]"
+            memory = f"&value[{index_name(f'{kind}.memory[1]')}]"
             if exported.joints:
-                memory = f"&value[{place(f'{kind}.memory[1,1]')}]"
+                memory = f"&value[{index_name(f'{kind}.memory[1,1]')}]"
         yield f"double *{kind}_memory = {memory};"
 
 

@@ -27,7 +27,7 @@ def model_description(
         fmiVersion="3.0",
         modelName=exported.law.name,
         instantiationToken=token,
-        description=summary(exported),
+        description=controller_line(exported),
         generationTool=f"smc_mujoco {__version__}",
         license="use without restriction, without warranty; the headers of FMI under the 2-clause "
         "BSD licence",
@@ -117,7 +117,7 @@ def written(root: xml.Element) -> str:
     return f'<?xml version="1.0" encoding="UTF-8"?>\n{xml.tostring(root, encoding="unicode")}\n'
 
 
-def summary(exported: ExportedLaw) -> str:
+def controller_line(exported: ExportedLaw) -> str:
     """Return the controller in one line."""
     parts = [f"law {exported.law}"]
     if exported.surface:

@@ -185,7 +185,7 @@ def _exported(
     eps: float = 0.0,
 ) -> ExportedLaw:
     """Return what is exported, checked. Arguments and errors as in `law_to_fmu`."""
-    sliding = coerce.surface("surface", surface, None)
+    sliding = coerce.coerced_surface("surface", surface, None)
     estimator = coerce.velocity("velocity", velocity, None)
     if estimator is not None and estimator.name == "measured":
         estimator = None
@@ -287,7 +287,7 @@ def _sources(exported: ExportedLaw, listed: Sequence[contents.Variable]) -> dict
     """Return name -> text of the C of a controller."""
     law = with_head(exported.law, "double", *exported.code["law"], exported.joints)
     files = {
-        "controller.c": contents.source(
+        "controller.c": contents.controller_source(
             listed, contents.helpers(exported), contents.body(listed, exported)
         )
     }
@@ -323,7 +323,7 @@ def _binary(files: Mapping[str, str], identifier: str) -> dict[str, bytes]:
         for name in sources:
             if name.endswith(".c"):
                 compiled.append(str(folder / name))
-        done = build.compiled(
+        done = build.compiled_library(
             [*BINARY_FLAGS, *compiled], target, "an FMU with a binary", COMPILE_TIMEOUT
         )
         if done.returncode or not target.exists():

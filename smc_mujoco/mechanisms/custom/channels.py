@@ -221,7 +221,7 @@ def _unnamed(label: str, file: str, model: mujoco.MjModel, named: list[str]) -> 
     )
 
 
-def check(label: str, file: str, model: mujoco.MjModel, channels: Pairs) -> None:
+def check_joints(label: str, file: str, model: mujoco.MjModel, channels: Pairs) -> None:
     """Raise ScenarioError for joints that do not exist or cannot be channels, and for flags that
     forbid control. `file` is the model's as a user here writes it, "" for a text.
     """
@@ -300,7 +300,7 @@ def measured_joints(
     return tuple(joints)
 
 
-def starts(
+def joint_starts(
     model: mujoco.MjModel, joints: list[str], channels: Pairs, keyframe: str | None
 ) -> tuple[dict[str, float], list[Range]]:
     """Return joint -> x0, rad or m, and the ranges of those joints whose x0 the user chose.

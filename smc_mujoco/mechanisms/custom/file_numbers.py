@@ -57,7 +57,7 @@ NAN = re.compile(
 TEXTS = {b"name", b"class", b"childclass", b"model", b"data"}  # attributes that are no numbers
 
 
-def check(label: str, spec: mujoco.MjSpec) -> None:
+def check_file_numbers(label: str, spec: mujoco.MjSpec) -> None:
     """Raise ScenarioError for a number of a model that no machine has. `spec` is as it was read."""
     for sentence in _wrong(spec):
         raise ScenarioError(f"{label} has {sentence}")

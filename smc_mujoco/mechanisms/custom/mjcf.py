@@ -123,7 +123,7 @@ class ModelSource:
         Raises:
           ScenarioError: no such hinge or slide, or a position that is beyond its range.
         """
-        model = mjcb.compiled(self.spec())
+        model = mjcb.compiled_spec(self.spec())
         names = [model.joint(i).name for i in range(model.njnt) if model.jnt_type[i] >= SLIDE]
         pairs = []
         for name, value in pose.items():
@@ -143,7 +143,7 @@ class ModelSource:
         """Parse the model, and check its numbers; a free joint without a name has its body's."""
         spec = self._read()
         if self.pose:
-            model = mjcb.compiled(spec.copy())
+            model = mjcb.compiled_spec(spec.copy())
             qpos = model.qpos0.copy()
             for name, place in self.pose:
                 qpos[model.joint(name).qposadr] = place
@@ -165,7 +165,7 @@ class ModelSource:
                 spec = mujoco.MjSpec.from_string(
                     self.text, include=included or None, assets=dict(self.assets)
                 )
-            elif from_urdf := urdf.read(Path(self.path)):
+            elif from_urdf := urdf.read_urdf(Path(self.path)):
                 file_numbers.check_urdf(self.label, from_urdf.text)
                 spec = from_urdf.spec()
             else:
@@ -174,7 +174,7 @@ class ModelSource:
             raise
         except FROM_MUJOCO as error:
             raise broken(self.path or self.label, str(error), self.path) from None
-        file_numbers.check(self.label, spec)
+        file_numbers.check_file_numbers(self.label, spec)
         taken = {joint.name for joint in spec.joints}
         for joint in spec.joints:
             if (
@@ -189,7 +189,7 @@ class ModelSource:
     def compiled(self, spec: mujoco.MjSpec) -> mujoco.MjModel:
         """Return the spec of this model, compiled."""
         try:
-            return mjcb.compiled(spec, _built)
+            return mjcb.compiled_spec(spec, _built)
         except FROM_MUJOCO as error:
             raise broken(self.path or self.label, str(error), self.path) from None
 
@@ -232,7 +232,7 @@ def _built(spec: mujoco.MjSpec) -> mujoco.MjModel:
     return spec.compile()
 
 
-def source(model: object, assets: Mapping[str, bytes | str] | None = None) -> ModelSource:
+def model_source(model: object, assets: Mapping[str, bytes | str] | None = None) -> ModelSource:
     """Coerce the path of a file, a text with its assets, an MjSpec, or a mjcf.RootElement of
     dm_control to a ModelSource, which stays as it is.
     """
@@ -343,7 +343,7 @@ def _of_spec(spec: mujoco.MjSpec) -> ModelSource:
     copied = spec.copy()
     mujoco.mj_clearCache(mujoco.mj_getCache())
     try:
-        model = mjcb.compiled(copied)
+        model = mjcb.compiled_spec(copied)
         text = full_precision_xml(copied)
     except FROM_MUJOCO as error:
         raise broken("the MjSpec", str(error), "") from None
@@ -394,7 +394,7 @@ def full_precision_xml(spec: mujoco.MjSpec) -> str:
 
 def _difference(model: mujoco.MjModel, again: mujoco.MjModel) -> str:
     """Return the first field in which two models differ by more than rounding, or ""."""
-    for name in fields(model):
+    for name in number_fields(model):
         a = getattr(model, name)
         b = getattr(again, name)
         if a.shape != b.shape or not np.allclose(
@@ -404,7 +404,7 @@ def _difference(model: mujoco.MjModel, again: mujoco.MjModel) -> str:
     return ""
 
 
-def fields(model: mujoco.MjModel) -> list[str]:
+def number_fields(model: mujoco.MjModel) -> list[str]:
     """Return the names of the model's arrays of numbers."""
     names = []
     for name in dir(model):
@@ -454,7 +454,7 @@ def digest(path: Path) -> tuple[str, Stamp]:
         contents[file] = file.read_bytes()
         return contents[file]
 
-    if from_urdf := urdf.read(path):
+    if from_urdf := urdf.read_urdf(path):
         for file in (path, *from_urdf.meshes.values()):
             read(file)
         return _sha256(contents.values()), stamp
@@ -534,7 +534,7 @@ def check_model(label: str, model: mujoco.MjModel) -> None:
     """Raise ScenarioError for NaN, for numbers beyond MAX_PARAMETER, and for names that this
     package uses itself.
     """
-    arrays = [(name, getattr(model, name)) for name in fields(model)]
+    arrays = [(name, getattr(model, name)) for name in number_fields(model)]
     for name in ("gravity", "wind", "density"):
         numbers = np.atleast_1d(getattr(model.opt, name))
         arrays.append((f"opt.{name}", numbers))

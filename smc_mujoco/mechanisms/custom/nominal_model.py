@@ -55,7 +55,7 @@ from smc_mujoco.mechanisms.plant import (
     Native,
     Values,
     compiled_for_runs,
-    write,
+    write_fields,
 )
 
 _DISABLED = mujoco.mjtDisableBit.mjDSBL_CONSTRAINT.value | mujoco.mjtDisableBit.mjDSBL_CONTACT.value
@@ -276,7 +276,7 @@ def prepared(
     model.opt.disableflags |= _DISABLED
     model.opt.enableflags &= ~_SLEEP
     fields = nominal.fields(model, Values(**parameters))
-    write(model, iter(list(fields)))
+    write_fields(model, iter(list(fields)))
     data = mujoco.MjData(model)
     mujoco.mj_setConst(model, data)
     mujoco.mj_resetData(model, data)

@@ -19,8 +19,8 @@ from smc_mujoco.mechanisms.custom.channels import (
     UNIT_OF_JOINT,
     Pairs,
     add_motor,
+    joint_starts,
     joints_of,
-    starts,
 )
 from smc_mujoco.mechanisms.custom.mjcf import ModelSource, unedited_model
 from smc_mujoco.mechanisms.plant import leave_out_scenery
@@ -83,7 +83,7 @@ def at_start(
     if keyframe is not None:
         mujoco.mj_resetDataKeyframe(model, data, model.key(keyframe).id)
     data.qvel[:] = 0.0
-    start_positions = starts(model, joints_of(channels), channels, keyframe)[0]
+    start_positions = joint_starts(model, joints_of(channels), channels, keyframe)[0]
     for joint, x in start_positions.items():
         if model.joint(joint).type[0] != FREE:
             data.qpos[model.joint(joint).qposadr[0]] = x

@@ -60,7 +60,7 @@ from smc_mujoco.mechanisms.custom.user_model import UserFields, UserModel
 from smc_mujoco.mechanisms.hardware.position_servo import PositionServo
 from smc_mujoco.mechanisms.hardware.tendons import Tendons, of_plant
 from smc_mujoco.mechanisms.layout import loaded
-from smc_mujoco.mechanisms.plant import Plant, catalogue, check_ranges, degrees_hint
+from smc_mujoco.mechanisms.plant import Plant, check_ranges, degrees_hint, plant_catalogue
 
 if TYPE_CHECKING:
     from dm_control.mjcf import RootElement
@@ -142,13 +142,13 @@ def plant_from(
     a partner, and no equality constraint acts; `plant.unmodelled` says why not. Films show the
     model in its own colours; those of several laws are mixed with the laws' colours.
     """
-    source = mjcf.source(path, assets)
+    source = mjcf.model_source(path, assets)
     if pose:
         if keyframe is not None:
             raise ScenarioError(f"keyframe is {keyframe!r} beside a pose: give one of them")
         source, keyframe = source.posed(pose), mjcf.POSE
     # laws and gains refer to plants by name
-    if name is not None and catalogue().taken(errors.name("name", name)):
+    if name is not None and plant_catalogue().taken(errors.name("name", name)):
         raise ScenarioError(f"name is {shown(name)}: give one that is none of smc.plants()")
     if channels is None:
         pairs: Pairs = own.UNNAMED  # refused with the joints that there are
@@ -158,7 +158,7 @@ def plant_from(
     model = mjcf.unedited_model(source)
     machine = _plant(source, pairs, name, keyframe, tip, others or "", measured)
     spec = source.spec()
-    read = urdf.read(Path(source.path))
+    read = urdf.read_urdf(Path(source.path))
     doubts = [
         *_narrow_ranges(source.label, machine, spec),
         *_assumed_drives(source.label, machine, pairs),
@@ -306,7 +306,7 @@ def _plant(
     mjcf.check_model(label, model)
     scenarios = own.suggested(pairs)
     pairs = _without_suggestions(pairs)
-    own.check(label, source.file, model, pairs)
+    own.check_joints(label, source.file, model, pairs)
     seen = own.measured_joints(label, model, pairs, measured)
     joints = [*joints_of(pairs), *seen]
     _check_names(label, model, keyframe, tip)
@@ -435,7 +435,7 @@ def _name(source: ModelSource, title: str) -> str:
         model = re.sub(r"[\W_]+", "_", title.lower().removesuffix("scene")).strip("_")
         folder = Path(source.path).parent.name
         file = next(filter(_says_something, (model, folder)), file)
-    return f"{file}.xml" if catalogue().taken(file) else file
+    return f"{file}.xml" if plant_catalogue().taken(file) else file
 
 
 def _says_something(name: str) -> bool:
@@ -452,7 +452,7 @@ def _places(
         _, units, x0 = own.places(model, joints, {}, keyframe)
         return units, {"x0": x0, "rest": x0}
     alone = [joint for joint in joints if not is_free(model, joint)]
-    start, checked = own.starts(model, alone, pairs, keyframe)
+    start, checked = own.joint_starts(model, alone, pairs, keyframe)
     names, units, x0 = own.places(model, joints, start, keyframe)
     unit_of = dict(zip(names, units, strict=True))
     named = [joint for joint, _, _ in checked]
@@ -510,10 +510,10 @@ def _unmodelled(model: mujoco.MjModel, joints: list[str], motors: Sequence[Motor
     for motor in motors:
         if any(isinstance(part, PositionServo) for part in motor.of_file):
             return SET_POINT
-    return missing(model, joints, motors)
+    return why_no_nominal(model, joints, motors)
 
 
-def missing(model: mujoco.MjModel, joints: list[str], motors: Sequence[Motor]) -> str:
+def why_no_nominal(model: mujoco.MjModel, joints: list[str], motors: Sequence[Motor]) -> str:
     """Return why there is no nominal model of the channels, or ""."""
     if np.any(model.eq_active0):
         return f"equality constraints hold its joints together: {WITHOUT_MODEL}"
@@ -554,7 +554,7 @@ def restored(data: Mapping, name: str) -> Plant:
     """Return the plant that `UserModel.about` describes."""
     if "text" in data:
         assets = {name: base64.b64decode(content) for name, content in data["assets"].items()}
-        source = mjcf.source(data["text"], assets)
+        source = mjcf.model_source(data["text"], assets)
     else:
         source = mjcf.source_of_record(data["path"], data["sha256"])
     source = source.posed(data.get("pose", {}))

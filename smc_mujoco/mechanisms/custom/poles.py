@@ -13,11 +13,11 @@ import mujoco
 import numpy as np
 
 from smc_mujoco.common.aliases import Array
-from smc_mujoco.common.mjcb import compiled
+from smc_mujoco.common.mjcb import compiled_spec
 from smc_mujoco.mechanisms.custom.model_constraints import sets_friction_solref, touches
 from smc_mujoco.mechanisms.hardware.part import Part
 from smc_mujoco.mechanisms.layout import loaded, moving_joints, state_with
-from smc_mujoco.mechanisms.plant import Plant, write
+from smc_mujoco.mechanisms.plant import Plant, write_fields
 
 POSES = 12  # in which poles are computed, beside the start; chosen
 SEED = 0  # of these poses
@@ -56,12 +56,12 @@ def _model(plant: Plant, parts: Iterable[Part]) -> mujoco.MjModel:
     spec = plant.spec()
     for part in parts:
         part.edit(spec)
-    model = compiled(spec)
+    model = compiled_spec(spec)
     model.opt.timestep = STEP
     for flag in UNTIED:
         model.opt.disableflags |= flag.value
     for part in parts:
-        write(model, part.fields(model))
+        write_fields(model, part.fields(model))
     return model
 
 

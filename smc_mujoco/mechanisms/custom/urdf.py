@@ -90,7 +90,7 @@ class Urdf(NamedTuple):
         return sentences
 
 
-def read(file: Path) -> Urdf | None:
+def read_urdf(file: Path) -> Urdf | None:
     """Return what a file says in a form that MuJoCo can read, or None where it is no URDF."""
     try:
         # with neither namespaces nor their prefixes, as MuJoCo reads it

@@ -6,7 +6,7 @@ SIDES = 6  # of a cross-section
 STEPS_PER_TURN = 12  # of the wire
 
 
-def draw(spec, name, start, end, *, radius, turns, wire, material):
+def add_coil(spec, name, start, end, *, radius, turns, wire, material):
     """Add a coil spring of whole turns to spec, as the skin `name`; radii of coil and wire in m.
 
     start, end: (body, position of the body, position of the wire's end), metres in the world with

@@ -140,7 +140,7 @@ def draw_spring(spec, i, start, end, radius, turns):
         return
     near = (f"p{i}/pendulum", pivot(spec, i), start)
     far = (f"p{i + 1}/pendulum", pivot(spec, i + 1), end)
-    coil.draw(
+    coil.add_coil(
         spec, f"spring{i}", near, far, radius=radius, turns=turns, wire=0.0045, material="brass"
     )
 
@@ -154,7 +154,7 @@ def fields(model, p):
 
 def pendulum_fields(model, p):
     """Yield the fields of the pendulums alone, without the springs between them."""
-    n = size(model)
+    n = pendulum_count(model)
     side = above(model.body("p0/pendulum").ipos)
     bodies = [model.body(f"p{i}/pendulum").id for i in range(n)]
     yield Field("body_mass", bodies, p.m)
@@ -169,10 +169,10 @@ def pendulum_fields(model, p):
 
 def _couplings(model):
     """Return the ids of the springs between neighbours."""
-    return [model.tendon(f"coupling{i}").id for i in range(size(model) - 1)]
+    return [model.tendon(f"coupling{i}").id for i in range(pendulum_count(model) - 1)]
 
 
-def size(model):
+def pendulum_count(model):
     """Return the number of pendulums in a chain's model. It counts bodies, because a Backlash adds
     joints.
     """

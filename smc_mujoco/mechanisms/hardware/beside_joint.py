@@ -11,7 +11,7 @@ from typing import ClassVar
 import mujoco
 import numpy as np
 
-from smc_mujoco.common.mjcb import compiled
+from smc_mujoco.common.mjcb import compiled_spec
 from smc_mujoco.mechanisms.hardware.part import Actuator
 from smc_mujoco.mechanisms.layout import LEAD, ROTOR, drive_ids, driven_ids
 from smc_mujoco.mechanisms.plant import Field
@@ -50,7 +50,7 @@ class BesideJoint(Actuator):
         raise NotImplementedError
 
     def edit(self, spec: mujoco.MjSpec) -> None:
-        rigid = compiled(spec.copy())
+        rigid = compiled_spec(spec.copy())
         pose = mujoco.MjData(rigid)
         mujoco.mj_kinematics(rigid, pose)
         for actuator in self.drives_of(spec):

@@ -25,7 +25,7 @@ def draw_springs(spec, height, radius):
     for name, side in SPRINGS:
         start = "machine", (0, 0, 0), (side * POST_END, 0, height)
         end = "cart", (0, 0, cart.RAIL_Z), (side * CART_END, 0, height)
-        coil.draw(spec, name, start, end, radius=radius, turns=20, wire=0.010, material="brass")
+        coil.add_coil(spec, name, start, end, radius=radius, turns=20, wire=0.010, material="brass")
 
 
 def fields(model, p):

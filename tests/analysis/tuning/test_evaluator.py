@@ -77,7 +77,7 @@ def uncompiled(y, gains, memory):
 
 def cases_of(plant, law, goal=SECOND):
     if isinstance(law, str):
-        gains = gain_sets.law(plant, law)
+        gains = gain_sets.law_with_gains(plant, law)
     else:
         gains = law
     return goal.scenarios(plant, gains, 3)

@@ -8,7 +8,7 @@ import pytest
 
 import smc_mujoco as smc
 from smc_mujoco.analysis.tuning.evaluator import Evaluator
-from smc_mujoco.analysis.tuning.objective import FAILURE_COST, Objective, restore
+from smc_mujoco.analysis.tuning.objective import FAILURE_COST, Objective, restored_objective
 from smc_mujoco.analysis.tuning.run_limits import (
     LIMIT_COST,
     RunLimit,
@@ -81,7 +81,7 @@ def test_gains_that_break_a_limit_cost_more_than_any_that_keep_it_and_less_than_
 def test_an_objective_keeps_its_limits_in_a_file_and_without_any_says_nothing_of_them():
     assert "limits" not in Objective().describe()
     goal = dataclasses.replace(Objective(), limits=limits_in("overshoot<10,calm"))
-    assert restore(goal.describe()).limits == goal.limits
+    assert restored_objective(goal.describe()).limits == goal.limits
 
 
 @pytest.mark.parametrize("needs", ["overshoot", "overshoot<0", "overshoot<x", "fast"])

@@ -16,9 +16,9 @@ from smc_mujoco.analysis.engine import scored_runs
 from smc_mujoco.analysis.tuning import search, search_space, stages
 from smc_mujoco.analysis.tuning.evaluator import EQUATION, MUJOCO
 from smc_mujoco.analysis.tuning.objective import FAILURE_COST, Objective
-from smc_mujoco.analysis.tuning.result import compare, load_tuned
+from smc_mujoco.analysis.tuning.result import compare_tunings, load_tuned
 from smc_mujoco.analysis.tuning.search import tune
-from smc_mujoco.control.law import catalogue
+from smc_mujoco.control.law import law_catalogue
 from smc_mujoco.control.units import Gain, Unit
 from smc_mujoco.metrics.catalogue import itae, tv
 
@@ -431,7 +431,7 @@ def test_gains_without_units_are_searched_about_their_defaults_with_a_warning():
 
 @pytest.mark.slow
 def test_a_search_leaves_a_box_that_lacks_the_optimum_by_a_decade_and_says_so():
-    own = catalogue()["observer_free"]
+    own = law_catalogue()["observer_free"]
     odd = dataclasses.replace(
         own, gains=dict(own.gains) | {"lam": Gain(6.0, Unit(force=-2), positive=True)}
     )
@@ -564,7 +564,7 @@ def test_a_run_that_fails_costs_more_than_any_other_and_less_the_later_it_fails(
 
 def test_a_law_that_got_more_than_its_rivals_is_not_compared(found, refused):
     rival = dataclasses.replace(found, law=smc.law("classical"))
-    assert {candidate.law.name for candidate in compare([rival, found])} == {
+    assert {candidate.law.name for candidate in compare_tunings([rival, found])} == {
         "classical",
         "observer_free",
     }
@@ -576,7 +576,7 @@ def test_a_law_that_got_more_than_its_rivals_is_not_compared(found, refused):
     ):
         (name,) = changed
         unequal = dataclasses.replace(rival, **changed)
-        refused(lambda unequal=unequal: compare([found, unequal]), name)
+        refused(lambda unequal=unequal: compare_tunings([found, unequal]), name)
 
 
 # files

@@ -16,14 +16,14 @@ from helpers.plants_ab import plant_b, plant_c
 import smc_mujoco as smc
 from smc_mujoco.analysis.tuning import search_space
 from smc_mujoco.control import gain_sets, units
-from smc_mujoco.control.law import catalogue
-from smc_mujoco.control.law import law as find_law
+from smc_mujoco.control.law import law_catalogue
+from smc_mujoco.control.law import library_law as find_law
 
 ALONE = dict.fromkeys(
     ("hierarchical", "rotary_swing_up"),
     "its plants have a free joint, and `search_space.scales` refuses them",
 )
-LAWS = [name for name in catalogue() if name not in ALONE]
+LAWS = [name for name in law_catalogue() if name not in ALONE]
 
 # Numbers with a unit in the formulas, which no gain states.
 G_IS_1 = (units.INERTIA, "takes an acceleration for a force, as it has no model and g counts as 1")
@@ -106,7 +106,7 @@ def run(law, X=1.0, T=1.0, F=1.0, model=0.0):
 
 def given(name, rng):
     """The law with gains near its own; a gain of 0 or inf, which has no unit, is given a size."""
-    law = catalogue()[name].bind({})
+    law = law_catalogue()[name].bind({})
     law = dataclasses.replace(
         law, gains={gain: VISIBLE.get(gain, value) for gain, value in law.gains.items()}
     )
@@ -155,7 +155,7 @@ def test_every_gain_has_a_unit_and_a_law_with_gains_can_be_tuned():
     for name in LAWS:
         law = smc.law(name)
         for gain in law.gains:
-            assert search_space.unit(law, gain) or catalogue()[name].gains[gain].held, name
+            assert search_space.unit(law, gain) or law_catalogue()[name].gains[gain].held, name
         if name != "none":
             assert search_space.box(
                 law,

@@ -12,7 +12,9 @@ from smc_mujoco.draw.film.dilation import widened
 from smc_mujoco.draw.film.stage import Stage
 from smc_mujoco.simulation.model import compile_model
 
-pytestmark = pytest.mark.skipif(gl.missing() is not None, reason=str(gl.missing()))
+pytestmark = pytest.mark.skipif(
+    gl.missing_renderer() is not None, reason=str(gl.missing_renderer())
+)
 SIZE = (640, 230)
 SEEN = 24  # of 255: a sample of a smoothed edge more or less is no difference
 

@@ -14,7 +14,7 @@ from smc_mujoco.draw.film import arrow_lines, arrows, film, world
 from smc_mujoco.draw.film.sheet import label_sizes
 
 SIZE = (800, 450)
-renders = pytest.mark.skipif(gl.missing() is not None, reason=str(gl.missing()))
+renders = pytest.mark.skipif(gl.missing_renderer() is not None, reason=str(gl.missing_renderer()))
 
 
 def placed(traces, names):

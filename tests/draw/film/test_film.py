@@ -23,8 +23,8 @@ from smc_mujoco.draw.film.arrows import (
     Arrow,
     Scale,
     arrows,
-    key,
     loads,
+    scale_words,
     scales,
     scales_by_channel,
     weights,
@@ -38,7 +38,7 @@ from smc_mujoco.simulation import model as models
 
 LAWS = ("observer_free", "classical", "adaptive", "super_twisting")
 SIZE = (480, 270)
-renders = pytest.mark.skipif(gl.missing() is not None, reason=str(gl.missing()))
+renders = pytest.mark.skipif(gl.missing_renderer() is not None, reason=str(gl.missing_renderer()))
 
 
 def runs(
@@ -340,7 +340,7 @@ def test_the_arrow_of_friction_is_at_the_joint_that_rubs(joint, channel):
     with_arrow = [i for i in range(2) if arrows(acting, 0, i, sizes[i], "#0072B2")]
     assert with_arrow == [channel]
     unit = "N" if joint == "slide" else "N·m"
-    assert f"→ reaction 0.02 {unit}" in key([trace], scales([trace]))
+    assert f"→ reaction 0.02 {unit}" in scale_words([trace], scales([trace]))
 
 
 def test_an_arrow_longer_than_the_longest_has_its_number_and_others_have_none(hit):
@@ -371,7 +371,7 @@ def test_a_brief_peak_does_not_set_the_longest_arrow(peak, samples, longest, wor
     arrow_scales = scales([dataclasses.replace(trace, applied=force, d=force)])
     scale = arrow_scales[driven([trace])]
     assert scale.longest == scale.full == pytest.approx(longest)
-    assert key([trace], arrow_scales) == [f"→ u {words}"]
+    assert scale_words([trace], arrow_scales) == [f"→ u {words}"]
 
 
 def test_a_network_has_no_arrows():
@@ -381,7 +381,7 @@ def test_a_network_has_no_arrows():
     clock = film.FilmClock(np.array([0.0, 0.1]), np.ones(2))
     track = MachineTrack(trace, "#000000", clock, clock.times, arrow_scales)
     assert not any(drawn.arrows for drawn in track.drawn)
-    assert key([trace], arrow_scales) == []
+    assert scale_words([trace], arrow_scales) == []
 
 
 def test_a_set_point_is_no_arrow_and_without_a_law_the_servo_is_named(tmp_path):
@@ -400,7 +400,7 @@ def test_a_set_point_is_no_arrow_and_without_a_law_the_servo_is_named(tmp_path):
         run = dataclasses.replace(run, applied=np.full_like(run.u, 0.4))
         (scale,) = scales([run]).values()
         control.append(scale.control)
-        names += wording.labels([run], None)
+        names += wording.run_names([run], None)
     assert control == [0.4, 0.0]
     assert names == ["No control", "Servo alone"]
 
@@ -418,10 +418,10 @@ def test_behind_a_drive_the_force_is_shown_and_the_command_pale():
     assert pale.rgba[3] == 0.45
     assert solid.layer == 0
     assert pale.layer == 1
-    assert key([slow], arrow_scales)[0].startswith("→ drive ")
+    assert scale_words([slow], arrow_scales)[0].startswith("→ drive ")
     strong = scales([dataclasses.replace(slow, force=3.0 * slow.applied)])[driven([slow])]
     assert strong.control == pytest.approx(3.0 * np.abs(slow.applied).max())
-    for words in key(runs(laws=LAWS[:1]), scales(runs(laws=LAWS[:1]))):
+    for words in scale_words(runs(laws=LAWS[:1]), scales(runs(laws=LAWS[:1]))):
         assert "drive" not in words
 
 

@@ -149,7 +149,7 @@ def test_words_over_machines_are_on_one_line_where_they_have_room():
     assert place == pytest.approx(page.page.texts[0].get_window_extent().x0, abs=1.0)
 
 
-@pytest.mark.skipif(gl.missing() is not None, reason=str(gl.missing()))
+@pytest.mark.skipif(gl.missing_renderer() is not None, reason=str(gl.missing_renderer()))
 def test_the_front_rotors_of_a_drone_have_the_colour_of_its_law_and_stay_transparent():
     with staged(machine("quadrotor", "geometric"), SIZE, colour="#0072B2") as stage:
         for name, is_own in (("disc1", True), ("disc2", False)):
@@ -159,7 +159,7 @@ def test_the_front_rotors_of_a_drone_have_the_colour_of_its_law_and_stay_transpa
             assert 0.0 < shade[3] < 1.0
 
 
-@pytest.mark.skipif(gl.missing() is not None, reason=str(gl.missing()))
+@pytest.mark.skipif(gl.missing_renderer() is not None, reason=str(gl.missing_renderer()))
 def test_the_wind_on_a_drone_has_its_arrow_over_it_and_its_path_a_map():
     drone = smc.plant("quadrotor")
     wind = smc.signals.Wind(4.0, time=0.1, width=0.4)
@@ -236,7 +236,7 @@ KINDS = {
 }
 
 
-@pytest.mark.skipif(gl.missing() is not None, reason=str(gl.missing()))
+@pytest.mark.skipif(gl.missing_renderer() is not None, reason=str(gl.missing_renderer()))
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_machine_stays_in_its_tile_with_its_arrows(kind):
     trace = machine(law="none", **KINDS[kind])

@@ -19,7 +19,9 @@ from smc_mujoco.draw.film import arrow_lines, arrows, camera, film, puppet, shee
 from smc_mujoco.draw.film.pace import FilmClock
 from smc_mujoco.simulation import model as models
 
-pytestmark = pytest.mark.skipif(gl.missing() is not None, reason=str(gl.missing()))
+pytestmark = pytest.mark.skipif(
+    gl.missing_renderer() is not None, reason=str(gl.missing_renderer())
+)
 SIZE = (1280, 720)
 TWO_LINKS = """<mujoco model="two"><worldbody><body pos="0 0 1"><joint name="a" axis="0 1 0"/>
   <geom type="capsule" size=".03" fromto="0 0 0 0 0 .5" mass="1"/>

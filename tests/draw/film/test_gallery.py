@@ -49,7 +49,7 @@ def test_each_file_is_a_clip():
     assert {path.stem for path in gallery.FOLDER.iterdir()} == set(gallery.CLIPS)
 
 
-@pytest.mark.skipif(bool(gl.missing()), reason="no OpenGL")
+@pytest.mark.skipif(bool(gl.missing_renderer()), reason="no OpenGL")
 @pytest.mark.parametrize("name", CLIPS)
 def test_a_clip_is_what_the_code_would_make(name, monkeypatch):
     frames = gallery.CLIPS[name].frames()

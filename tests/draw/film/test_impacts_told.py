@@ -15,7 +15,7 @@ from smc_mujoco.draw import states, style
 from smc_mujoco.draw.decimate import Envelope
 from smc_mujoco.draw.film import arrows, film, flat_arrows, pace
 
-renders = pytest.mark.skipif(gl.missing() is not None, reason=str(gl.missing()))
+renders = pytest.mark.skipif(gl.missing_renderer() is not None, reason=str(gl.missing_renderer()))
 RED = (1.0, 0.0, 0.0, 1.0)
 
 

@@ -12,9 +12,11 @@ from helpers.films import staged, without_charts
 import smc_mujoco as smc
 from smc_mujoco.common import gl
 from smc_mujoco.draw.film.arrow_lines import MAX_SWEEP, path
-from smc_mujoco.draw.film.arrows import Scale, frames, key, scales
+from smc_mujoco.draw.film.arrows import Scale, frames, scale_words, scales
 
-pytestmark = pytest.mark.skipif(gl.missing() is not None, reason=str(gl.missing()))
+pytestmark = pytest.mark.skipif(
+    gl.missing_renderer() is not None, reason=str(gl.missing_renderer())
+)
 SUITE = importlib.util.find_spec("dm_control")
 if SUITE is None or not SUITE.submodule_search_locations:
     pytest.skip("dm_control is not installed", allow_module_level=True)
@@ -58,7 +60,7 @@ def test_the_key_names_what_pushes_a_foreign_model_of_its_own_accord():
         )
     )
     assert trace.reaction.any()  # the joint's limit
-    assert "reaction" in key([trace], scales([trace]))[0]
+    assert "reaction" in scale_words([trace], scales([trace]))[0]
 
 
 def hung(floor, **fields):

@@ -10,7 +10,7 @@ from smc_mujoco.common import gl
 from smc_mujoco.draw import lettering
 from smc_mujoco.draw.film import arrows, camera, flat_arrows, puppet, sheet, world
 
-renders = pytest.mark.skipif(gl.missing() is not None, reason=str(gl.missing()))
+renders = pytest.mark.skipif(gl.missing_renderer() is not None, reason=str(gl.missing_renderer()))
 ARM = """
 <mujoco model="arm">
   <worldbody>
@@ -142,7 +142,7 @@ def test_a_chart_keeps_the_unit_of_a_joint_with_a_long_name():
 def test_an_arrow_s_number_hides_neither_the_arrow_nor_what_it_is_at(free, other, place):
     image = Image.new("RGB", (200, 100), "white")
     arrow = arrows.Arrow(0.0, 1.0, (0.0, 0.0, 0.0, 1.0), words="20 N")
-    flat_arrows.write(image, arrow, np.array([other, free]), 0.5, [])
+    flat_arrows.write_number(image, arrow, np.array([other, free]), 0.5, [])
     y, x = np.nonzero(np.asarray(image)[..., 0] < 128)
     if place == "beyond":
         assert x.min() > free[0]

@@ -7,7 +7,7 @@ import pytest
 from helpers.runs import free_mass
 
 import smc_mujoco as smc
-from smc_mujoco.control.law import all_laws, catalogue
+from smc_mujoco.control.law import all_laws, law_catalogue
 from smc_mujoco.evidence.accuracy import orders
 from smc_mujoco.simulation.conditions import Condition
 
@@ -49,7 +49,7 @@ def test_every_law_states_its_order_of_accuracy():
 @pytest.mark.slow
 def test_second_order_laws_are_of_second_order_on_the_double_integrator_or_the_table_says_why_not():
     names = []
-    for name, law in catalogue().items():
+    for name, law in law_catalogue().items():
         if law.order("s", law.defaults) == 2.0:
             names.append(name)
     table = defaults(names)

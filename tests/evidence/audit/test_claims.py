@@ -37,7 +37,7 @@ from smc_mujoco.mechanisms.plant import plant as find_plant
 from smc_mujoco.metrics.catalogue import metrics
 from smc_mujoco.simulation.gaber_study import PLANTS
 from smc_mujoco.simulation.grid import grid
-from smc_mujoco.simulation.run_key import key
+from smc_mujoco.simulation.run_key import run_key
 
 GABER = paper("gaber")
 CODE = GABER.claims["14"].evidence.__globals__  # of its claims.py
@@ -312,7 +312,7 @@ def test_the_rows_of_a_table_stand_for_their_runs(runs):
     for m in metrics():
         row[m.name] = None if m.network else 1.5
     row |= {
-        "hash": key(scenario),
+        "hash": run_key(scenario),
         "law": OURS,
         "gains": '{"lam": 6.0}',
         "failure": None,
@@ -327,7 +327,7 @@ def test_the_rows_of_a_table_stand_for_their_runs(runs):
 @pytest.mark.parametrize("condition", ["nominal", "noise", "jump_hard", "encoder"])
 def test_a_run_of_the_study_has_the_key_that_the_study_gives_it(runs, condition):
     (scenario,) = grid(["duffing"], [OURS], [condition], 1, "study")
-    assert key(runs.scenario("duffing", OURS, condition)) == key(scenario)
+    assert run_key(runs.scenario("duffing", OURS, condition)) == run_key(scenario)
 
 
 def test_a_change_of_plant_keeps_the_gains_of_its_name(runs):

@@ -185,16 +185,16 @@ def test_a_quick_audit_has_the_quick_sets(folder):
 
 def test_a_change_breaks_the_seal(done, tmp_path):
     path = done.save(tmp_path / "evidence.json")
-    assert evidence.check(path)["counts"] == {REFUTED: 1}
+    assert evidence.read_sealed(path)["counts"] == {REFUTED: 1}
     path.write_text(path.read_text().replace('"verdict": "refuted"', '"verdict": "supported"'))
     with pytest.raises(ScenarioError, match="was changed, since it was written"):
-        evidence.check(path)
+        evidence.read_sealed(path)
     data = from_json(path.read_text())
     path.write_text(json.dumps(data | {"format": "another"}))
     with pytest.raises(ScenarioError, match="its format is 'another'"):
-        evidence.check(path)
+        evidence.read_sealed(path)
     with pytest.raises(ScenarioError, match="no file of evidence"):
-        evidence.check(tmp_path / "none.json")
+        evidence.read_sealed(tmp_path / "none.json")
 
 
 # table

@@ -6,7 +6,7 @@ import pytest
 
 import smc_mujoco as smc
 from smc_mujoco.common import fingerprint
-from smc_mujoco.simulation.run_key import key
+from smc_mujoco.simulation.run_key import run_key
 
 
 @pytest.mark.quick
@@ -19,7 +19,7 @@ def test_a_paper_changes_the_key_of_verdicts_and_no_key_of_a_run(monkeypatch, tm
 
     def now() -> tuple[str, str]:
         fingerprint.package.cache_clear()
-        return key(scenario), fingerprint.package()
+        return run_key(scenario), fingerprint.package()
 
     of_run, of_verdicts = now()
     (package / "evidence" / "commands" / "words.py").write_text("# other words")

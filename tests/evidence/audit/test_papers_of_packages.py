@@ -12,9 +12,9 @@ __all__ = ["install"]  # the fixture
 
 @pytest.fixture
 def papers_read_again():
-    paper.catalogue.cache_clear()
+    paper.paper_catalogue.cache_clear()
     yield
-    paper.catalogue.cache_clear()
+    paper.paper_catalogue.cache_clear()
 
 
 @pytest.mark.quick
@@ -35,7 +35,7 @@ def test_a_paper_with_something_wrong_is_left_out_of_the_list(install, tmp_path)
     assert [sentence.partition(": its")[0] for sentence in first] == ["package 'papers'"]
     assert "no_folder.py is no folder: give a package with paper.toml and claims.py" in first[0]
     assert paper.papers()["their_paper"].name == "their_paper"
-    assert paper.catalogue().package("their_paper") == "papers"
+    assert paper.paper_catalogue().package("their_paper") == "papers"
     paper._read_once.cache_clear()
     (home / "paper.toml").write_text("title = 3")
     (sentence,) = said(paper.papers)

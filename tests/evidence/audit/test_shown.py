@@ -16,7 +16,7 @@ from smc_mujoco.evidence.audit.verdict import (
     Threshold,
     check,
     judged,
-    summary,
+    totals_line,
 )
 
 NEAR = check("duffing: ripple, m", 0.25, "<", 1.0)
@@ -126,8 +126,8 @@ def test_an_audit_says_verdicts_what_decides_and_how_far_a_check_is_from_its_lim
             for audit_check in claim.checks(gains):
                 slacks.append(audit_check.slack)
         assert slacks == pytest.approx(slack, abs=1e-9)
-    assert re.findall("(.) ([0-9])", summary(claims)) == [*zip("●◐–○◧", "22111", strict=True)]
-    assert re.findall("(.) ([0-9])", summary([])) == []
+    assert re.findall("(.) ([0-9])", totals_line(claims)) == [*zip("●◐–○◧", "22111", strict=True)]
+    assert re.findall("(.) ([0-9])", totals_line([])) == []
 
 
 PRINTED = {  # value, relation, limit -> as it is printed

@@ -25,7 +25,7 @@ from smc_mujoco.evidence.audit import claim_runs, gain_search
 from smc_mujoco.evidence.audit.audit import audit
 from smc_mujoco.evidence.audit.paper import paper, shipped
 from smc_mujoco.evidence.audit.verdict import Claim
-from smc_mujoco.simulation.run_key import key
+from smc_mujoco.simulation.run_key import run_key
 from smc_mujoco.simulation.scenario import Scenario
 
 GOLDEN = Path(__file__).parent / "quick_verdicts.json"
@@ -121,7 +121,7 @@ def runs_made_once(nudge: float = 0.0) -> Iterator[None]:
     stream = claim_runs.stream
 
     def kept(scenarios, threads):
-        keys = [key(scenario.named(None)) for scenario in scenarios]
+        keys = [run_key(scenario.named(None)) for scenario in scenarios]
         new = {
             name: scenario
             for name, scenario in zip(keys, scenarios, strict=True)

@@ -94,14 +94,14 @@ def test_late_values_are_those_of_the_last_samples():
 def test_the_least_bound_of_fixed_time_is_the_integral():
     from scipy.integrate import quad
 
-    from smc_mujoco.control.law import law
+    from smc_mujoco.control.law import library_law
 
     for k1, k2, a, b in (
         (2.0, 2.0, 0.5, 1.5),
         (1.0, 2.0, 0.5, 2.0),
         (3.0, 1.0, 0.3, 1.5),
     ):
-        fixed_time = law(
+        fixed_time = library_law(
             "fixed_time",
             k1=k1,
             k2=k2,

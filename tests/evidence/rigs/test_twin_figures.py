@@ -33,7 +33,7 @@ def test_whether_a_record_was_used_follows_from_the_rig(monkeypatch):
     assert {figure.use for figure in twin_figures.rows("emps")} == {twin_figures.UNFITTED}
     fitted_rig = dataclasses.replace(smc.rig("qube_servo"), identified_from=("11",))
     monkeypatch.setattr(
-        twin_figures, "catalogue", lambda: {**rig.catalogue(), "qube_servo": fitted_rig}
+        twin_figures, "rig_catalogue", lambda: {**rig.rig_catalogue(), "qube_servo": fitted_rig}
     )
     assert held.use == twin_figures.FITTED
     assert row("qube_servo", "06", "theta rms").use == twin_figures.HELD_OUT

@@ -16,7 +16,7 @@ from numba import njit
 import smc_mujoco as smc
 from smc_mujoco.cli import main as cli
 from smc_mujoco.common.rebuild import rebuild
-from smc_mujoco.control.law import Measurement, catalogue, sliding
+from smc_mujoco.control.law import Measurement, law_catalogue, sliding
 from smc_mujoco.control.laws import observer_free_q15 as q15
 from smc_mujoco.exchange.c import build
 from smc_mujoco.exchange.c.law_from_c import CLaw
@@ -25,7 +25,7 @@ from smc_mujoco.simulation.python_functions import gains_of
 
 pytestmark = needs_compiler
 
-LAWS = catalogue()
+LAWS = law_catalogue()
 STRICT = ("-std=c99", "-Wall", "-Wextra", "-Werror", "-pedantic", "-Wmissing-prototypes")
 PLANTS = ("inverted_pendulum", "duffing", "pendulum_network")
 # What scenarios are like: without the model, with it, and with a surface, where the law takes one.

@@ -8,14 +8,14 @@ from exchange.helpers.compiler import needs_compiler
 from exchange.helpers.flights import MEASUREMENT, recorded, scenarios
 
 import smc_mujoco as smc
-from smc_mujoco.control.law import FREE_BODY, joint_catalogue
+from smc_mujoco.control.law import FREE_BODY, joint_law_catalogue
 from smc_mujoco.exchange.c import build
 from smc_mujoco.mechanisms.rotation import quaternion, rotation_vector
 
 pytestmark = needs_compiler
 
 STRICT = ("-std=c99", "-Wall", "-Wextra", "-Werror", "-pedantic", "-Wmissing-prototypes")
-LAWS = [name for name, law in joint_catalogue().items() if FREE_BODY in law.plants]
+LAWS = [name for name, law in joint_law_catalogue().items() if FREE_BODY in law.plants]
 # Firmware: reads quaternions and measurements, of which it computes the errors itself.
 FIRMWARE = """#include "law.c"
 #include <stdio.h>

@@ -193,7 +193,7 @@ def test_two_laws_of_one_library_are_two_laws(file, tmp_path):
         scenario(smc.exchange.law_from_c(target, symbol=name)) for name in ("first", "second")
     )
     assert first != second
-    assert run_key.key(first) != run_key.key(second)
+    assert run_key.run_key(first) != run_key.run_key(second)
 
 
 def test_a_scenario_is_its_copies_equal_and_no_other_law_s(file):
@@ -256,7 +256,7 @@ def test_another_process_runs_what_was_loaded_here_whatever_the_file_holds_by_th
 
 def test_what_a_study_knows_of_it_is_its_code(file, tmp_path):
     def key(gain: float, name: str = "my_law.c", **more: object) -> str:
-        return run_key.key(
+        return run_key.run_key(
             scenario(
                 smc.exchange.law_from_c(file(law(f"out[0] = -{gain} * y->e;"), name), **more)()
             )
@@ -272,7 +272,7 @@ def test_what_a_study_knows_of_it_is_its_code(file, tmp_path):
     again = pickle.loads(
         pickle.dumps(scenario(smc.exchange.law_from_c(file(law("out[0] = -1.0 * y->e;")))()))
     )
-    assert run_key.key(again) == first
+    assert run_key.run_key(again) == first
 
 
 def test_its_functions_and_data_are_its_own_whatever_else_has_their_names(file):

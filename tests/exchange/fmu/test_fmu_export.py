@@ -18,17 +18,17 @@ from fmpy.validation import validate_fmu  # noqa: E402
 
 import smc_mujoco as smc  # noqa: E402
 from smc_mujoco.control import estimator, surface  # noqa: E402
-from smc_mujoco.control.law import catalogue  # noqa: E402
+from smc_mujoco.control.law import law_catalogue  # noqa: E402
 from smc_mujoco.exchange.c import build  # noqa: E402
 
 pytestmark = needs_compiler
 
 REFERENCE = smc.Sine(0.2, 3.0)
-SURFACES = surface.catalogue()
+SURFACES = surface.surface_catalogue()
 STRICT = ("-std=c99", "-Wall", "-Wextra", "-pedantic", "-Werror")
 FIRST = [
     n
-    for n, law in catalogue().items()
+    for n, law in law_catalogue().items()
     if law.relative_degree == 1 and not (law.plants or law.requires_model)
 ]
 # (law, surface, estimator): each surface and each estimator once or more, laws with memory, of t,
@@ -37,7 +37,7 @@ COMBINED = [
     *zip(
         FIRST,
         [n for n, s in SURFACES.items() if s.relative_degree == 1],
-        itertools.cycle(estimator.catalogue()),
+        itertools.cycle(estimator.estimator_catalogue()),
     ),
     ("observer_free_third", None, "extended_state_observer"),
     ("prescribed_time", None, "kalman"),
@@ -133,7 +133,7 @@ def test_an_fmu_gives_the_bits_of_a_run(combined, folder, one):
 
 @pytest.mark.slow
 def test_every_law_is_a_valid_fmu(folder):
-    for name, template in catalogue().items():
+    for name, template in law_catalogue().items():
         path = smc.exchange.law_to_fmu(template, folder / f"valid-{name}.fmu", binary=False)
         assert validate_fmu(str(path)) == []
         variables = {}

@@ -34,7 +34,7 @@ def test_what_a_file_includes_counts_though_the_file_is_no_xml(kind, tmp_path):
     for place in (0.3, 0.4):
         wall = f'<geom name="wall" size=".1" pos="{place} 0 0"/>'
         included.write_text(f"<mujocoinclude>{wall}</mujocoinclude>")
-        source = mjcf.source(tmp_path / "m.xml")
+        source = mjcf.model_source(tmp_path / "m.xml")
         assert mjcf.unedited_model(source).geom("wall").pos[0] == place
         hashes.append(source.sha256)
     assert hashes[0] != hashes[1]
@@ -58,7 +58,7 @@ def test_a_mesh_that_is_written_again_in_the_same_second_is_the_one_that_runs(tm
             f"v 0 0 0\nv {size} 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
         )
         os.utime(mesh, ns=(0, 10**9 + k))
-        masses.append(mjcf.source(tmp_path / "m.xml").spec().compile().body_mass[1])
+        masses.append(mjcf.model_source(tmp_path / "m.xml").spec().compile().body_mass[1])
     assert masses == pytest.approx(np.array(sizes) * masses[0])
 
 
@@ -75,7 +75,7 @@ def test_a_height_field_that_is_written_again_in_the_same_second_is_the_one_that
         content = np.array([3, 3], np.int32).tobytes() + grid.tobytes()
         (tmp_path / "h.bin").write_bytes(content)
         os.utime(tmp_path / "h.bin", ns=(0, 10**9 + k))
-        model = mjcf.source(tmp_path / "m.xml").spec().compile()
+        model = mjcf.model_source(tmp_path / "m.xml").spec().compile()
         middles.append(model.hfield_data[1])
     assert middles == pytest.approx(heights)
 
@@ -100,7 +100,7 @@ def test_meshes_that_are_only_seen_are_not_kept_beside_those_of_runs(tmp_path, i
         'conaffinity="0"/></body></worldbody></mujoco>'
     )
     plant = smc.plant_from(tmp_path / "m.xml", {"j": smc.Channel(motor=True)})
-    model = mjcf.unedited_model(mjcf.source(tmp_path / "m.xml"))
+    model = mjcf.unedited_model(mjcf.model_source(tmp_path / "m.xml"))
     assert plant.load().nmesh == 1
     assert model.nmesh == (inertia == "true")  # where its inertia is of the mesh alone
     assert model.body_mass.tolist() == plant.load().body_mass.tolist()

@@ -126,7 +126,7 @@ def test_a_foreign_model_is_drawn_seen_tuned_and_written_in_c(name, tmp_path):
     assert len(labelled) == min(len(joints), MAX_WORST), labels  # of many those with large errors
     for label in labels:
         assert "mean" not in label
-    if gl.missing() is None:
+    if gl.missing_renderer() is None:
         picture = np.asarray(
             Image.open(
                 smc.film(

@@ -990,11 +990,13 @@ def test_a_model_that_is_no_file_moves_as_its_file_does_and_is_kept_with_its_run
     (path.parent / "meshes" / "c.obj").unlink()
     again = smc.load(trace.save(tmp_path / "run.npz"))
     assert again.scenario == trace.scenario
-    assert run_key.key(again.scenario) == run_key.key(scenario)
+    assert run_key.run_key(again.scenario) == run_key.run_key(scenario)
     np.testing.assert_array_equal(smc.run(again.scenario).x, trace.x)
     edited = MESHED.replace("7.1234567890123", "7.1234567890124")
     changed = smc.plant_from(edited, channels, assets={"c.obj": content})
-    assert run_key.key(dataclasses.replace(scenario, plant=changed)) != run_key.key(scenario)
+    assert run_key.run_key(dataclasses.replace(scenario, plant=changed)) != run_key.run_key(
+        scenario
+    )
 
 
 def test_an_mjspec_keeps_all_its_digits_and_is_taken_as_it_is_now(meshed):
@@ -1021,7 +1023,7 @@ def test_a_trace_loads_back_and_knows_its_file(arm, tmp_path, monkeypatch):
     path = trace.save(tmp_path / "a.npz")
     again = smc.load(path)
     assert again.scenario == trace.scenario
-    assert run_key.key(again.scenario) == run_key.key(trace.scenario)
+    assert run_key.run_key(again.scenario) == run_key.run_key(trace.scenario)
     np.testing.assert_array_equal(smc.run(again.scenario).x, trace.x)
     arm(bodies=BALL)
     words = r"the scenario of \S*a.npz cannot be restored, its model \S*arm.xml"

@@ -11,7 +11,7 @@ from helpers.models import unnamed
 
 from smc_mujoco.common import mjcb
 from smc_mujoco.mechanisms.hardware.contact import Contact, damping_ratio
-from smc_mujoco.mechanisms.plant import catalogue, plant, write
+from smc_mujoco.mechanisms.plant import plant, plant_catalogue, write_fields
 
 pytestmark = pytest.mark.quick
 
@@ -22,7 +22,7 @@ STEP = 2.5e-4  # s
 G = 9.81  # m/s^2
 OFFERED = [
     (name, kind)
-    for name, p in sorted(catalogue().items())
+    for name, p in sorted(plant_catalogue().items())
     for kind in p.contacts
     if name != "panda"
 ]
@@ -45,7 +45,7 @@ HITS = pytest.mark.parametrize(("name", "kind"), MEETS, ids=["-".join(pair) for 
 
 def idle(name):
     """The plant without its own forces."""
-    p = catalogue()[name]
+    p = plant_catalogue()[name]
     zero = {}
     for key in p.parameters:
         if key not in ("m", "l", "M"):
@@ -65,8 +65,8 @@ def built(p, contact, mechanism="equation"):
     contact.edit_on(p, spec)
     spec.option.timestep, spec.option.integrator = STEP, mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     model = spec.compile()
-    write(model, fields(model, p.values({})))
-    write(model, contact.fields(model))
+    write_fields(model, fields(model, p.values({})))
+    write_fields(model, contact.fields(model))
     data = mujoco.MjData(model)
     mujoco.mj_setConst(model, data)
     return model, data
@@ -184,7 +184,7 @@ def test_a_blow_keeps_the_share_of_speed_it_should(name, kind, restitution):
     ):
         model, data = built(idle(name), contact := Contact(kind, restitution=restitution))
         if kind == "floor" and len(data.qpos) > 1:
-            write(
+            write_fields(
                 model,
                 Contact(
                     kind,
@@ -302,7 +302,7 @@ def test_bobs_that_start_on_each_others_sides_start_inside(name):
 
 def test_a_contact_without_numbers_keeps_the_plants_own():
     for name, kind in OFFERED:
-        p = catalogue()[name]
+        p = plant_catalogue()[name]
         model, _ = built(p, Contact(kind))
         assert list(Contact(kind).fields(model)) == []
         rubs = any(model.pair(i).name.startswith("rub:") for i in range(model.npair))

@@ -7,7 +7,7 @@ hanging in records, and 0 upright in the plant.
 
 import math
 
-from smc_mujoco.control.law import law
+from smc_mujoco.control.law import library_law
 from smc_mujoco.control.source import SHIPPED, GainSearch
 from smc_mujoco.identification.published_rig import PublishedRig
 from smc_mujoco.identification.records import Columns
@@ -37,12 +37,12 @@ def machine(q):
 # rad, |u| <= 6 N m.
 SEARCH = GainSearch(rule="differential evolution", evaluations=96)
 LAWS = (
-    law("observer_free", lam=2.749, k1=18.27).sourced(SHIPPED, SEARCH),
-    law("classical", k=1.578, c=16.55).sourced(SHIPPED, SEARCH),
-    law("boundary_layer", k=4.388, c=35.09, phi=0.3036).sourced(SHIPPED, SEARCH),
-    law("adaptive", gamma=2.477, c=19.77).sourced(SHIPPED, SEARCH),
-    law("super_twisting", k1=1.283, k2=6.288, c=6.356).sourced(SHIPPED, SEARCH),
-    law("pid", kp=341.0, ki=1107.0, kd=4.143, tt=0.1287).sourced(SHIPPED, SEARCH),
+    library_law("observer_free", lam=2.749, k1=18.27).sourced(SHIPPED, SEARCH),
+    library_law("classical", k=1.578, c=16.55).sourced(SHIPPED, SEARCH),
+    library_law("boundary_layer", k=4.388, c=35.09, phi=0.3036).sourced(SHIPPED, SEARCH),
+    library_law("adaptive", gamma=2.477, c=19.77).sourced(SHIPPED, SEARCH),
+    library_law("super_twisting", k1=1.283, k2=6.288, c=6.356).sourced(SHIPPED, SEARCH),
+    library_law("pid", kp=341.0, ki=1107.0, kd=4.143, tt=0.1287).sourced(SHIPPED, SEARCH),
 )
 SIMPLE_PENDULUM = PublishedRig(
     name="simple_pendulum_ak80",

@@ -91,10 +91,10 @@ class Program:
 
     def unique_name(self, name: str) -> str:
         """Reserve and return a name that is not used yet: `name`, or `name` with a number."""
-        unique = plain(name)
+        unique = c_name(name)
         counts = itertools.count(2)
         while unique in self.used_names:
-            unique = f"{plain(name)}_{next(counts)}"
+            unique = f"{c_name(name)}_{next(counts)}"
         self.used_names.add(unique)
         return unique
 
@@ -137,14 +137,14 @@ class Program:
         if data.ndim != 1 or data.dtype.kind not in "if":
             raise refuse(
                 None,
-                f"the constant {plain(name)}, which is not a one-dimensional array of numbers,",
+                f"the constant {c_name(name)}, which is not a one-dimensional array of numbers,",
             )
         sort = {"i": "int", "f": "real"}[data.dtype.kind]
         items = []
         for number in data.tolist():
             item = literal(number, self.single, ast.Constant(number))
             items.append(item.text)
-        content = f"[{len(items)}] = {{\n{rows(items)}\n}};"
+        content = f"[{len(items)}] = {{\n{wrapped_lines(items)}\n}};"
         if content not in self.constants:
             self.constants[content] = self.unique_name(name)
         name = self.constants[content]
@@ -266,7 +266,7 @@ class Lines:
         """Return a variable's name in C."""
         if name in RESERVED:
             return f"{name}_"
-        return plain(name)
+        return c_name(name)
 
     def origins(self, text: str) -> set[str]:
         """Return the names of the variables that some C mentions, and of the arrays they are."""
@@ -311,7 +311,7 @@ def declaration(name: str, kind: Kind) -> str:
     return f"{TYPES[kind.sort]} {name} = 0;"
 
 
-def plain(name: str) -> str:
+def c_name(name: str) -> str:
     """Return a name in ASCII letters, which every C99 compiler accepts."""
     return "".join(c if c.isascii() else f"u{ord(c):04x}" for c in name)
 
@@ -326,7 +326,7 @@ def words(text: str) -> set[str]:
     return set(re.findall(r"\w+", text))
 
 
-def rows(items: Sequence[str]) -> str:
+def wrapped_lines(items: Sequence[str]) -> str:
     """Return items in lines of at most 100 characters."""
     text = ", ".join(items) + ","
     return textwrap.fill(text, 100, initial_indent="    ", subsequent_indent="    ")

@@ -18,10 +18,10 @@ from smc_mujoco.exchange.c.translation.c_text import (
     POWERS,
     ROUNDING,
     SAME_IN_C,
+    c_name,
     joined,
-    plain,
 )
-from smc_mujoco.exchange.c.translation.python_source import check, in_python, refuse
+from smc_mujoco.exchange.c.translation.python_source import check_law_name, in_python, refuse
 from smc_mujoco.exchange.c.translation.values import (
     ATOM,
     BOOL,
@@ -147,7 +147,7 @@ class Expressions(Arrays):
             return self.gain(owner, node.attr)
         if not owner.kind.fields:
             raise refuse(node, "an attribute")
-        check("field", node.attr, owner.kind.fields)
+        check_law_name("field", node.attr, owner.kind.fields)
         return owner.elements()[owner.kind.fields.index(node.attr)]
 
     def measured(self, y: Value, name: str) -> Value:
@@ -157,25 +157,25 @@ class Expressions(Arrays):
             fields = ("t", "dt", "model", *joint_law.ARRAYS)
         else:
             fields = CHANNEL_FIELDS.get(program.component.kind, Measurement._fields)
-        check("measurement", name, fields)
+        check_law_name("measurement", name, fields)
         place = f"{y.text}->{name}"
         if not program.joints or name not in joint_law.ARRAYS:
             return Value(place, REAL)
         shape = program.vector
         if name == "M":
             shape *= 2
-        return array_at(place, Kind("real", shape), sources=within(y, name))
+        return array_at(place, Kind("real", shape), sources=attribute_names(y, name))
 
     def gain(self, gains: Value, name: str) -> Value:
         """Return a gain: a number, or an array with a number of each joint."""
         program = self.program
-        check("gain", name, program.component.gains)
-        offset = f"GAIN_{plain(name)}"
+        check_law_name("gain", name, program.component.gains)
+        offset = f"GAIN_{c_name(name)}"
         if program.joints:
             offset += f" * {JOINTS}"
         if program.joints and name not in program.component.shared:
             kind = Kind("real", program.vector)
-            return array_at(gains.text, kind, offset, within(gains, name))
+            return array_at(gains.text, kind, offset, attribute_names(gains, name))
         return Value(f"{gains.text}[{offset}]", REAL)
 
     def _unaryop(self, node: ast.UnaryOp) -> Value:
@@ -350,6 +350,6 @@ class Expressions(Arrays):
         return Value(f"{name}({joined(values)})", kind)
 
 
-def within(owner: Value, name: str) -> list[str]:
+def attribute_names(owner: Value, name: str) -> list[str]:
     """Return the names of an attribute, whose numbers are its owner's."""
     return [f"{source}.{name}" for source in owner.sources]

@@ -131,7 +131,7 @@ def root(node: ast.AST) -> str:
     return getattr(node, "id", "")
 
 
-def check(what: str, name: str, names: Iterable[str]) -> None:
+def check_law_name(what: str, name: str, names: Iterable[str]) -> None:
     """Refuse a name that a law cannot read."""
     if name not in names:
         raise Untranslatable(f"it reads an {unknown(what, name, names)}")
