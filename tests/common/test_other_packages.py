@@ -415,5 +415,6 @@ def test_the_template_installs_offline_and_passes_its_tests(tmp_path):
         "no:cacheprovider",
         EXAMPLE / "tests",
     )
-    listed = run("-m", "smc_mujoco", "list")
+    assert "sprung_cart" in run("-m", "smc_mujoco", "list")
+    listed = run("-m", "smc_mujoco", "list", "--full", "--json", "-")
     assert listed.count("[my-smc-package]") == 3

@@ -82,7 +82,7 @@ def list_(
     if name is not None and Path(name).suffix in (".c", ".so"):
         with importing():
             loader = annexes.module("smc_mujoco.exchange.c.law_from_c", f"a law in C, {name},")
-        lines = loader.check(Path(name), None, None, "smc_law", (), C_TIME)
+        lines = loader.check_law_source(Path(name), None, None, "smc_law", (), C_TIME)
         terminal.print(*lines, sep="\n", soft_wrap=True)
     elif name is not None and name not in KINDS:
         with importing():
