@@ -279,7 +279,7 @@ def _winners(contests: Sequence[Contest]) -> ScreenPart:
         if (fact := fact_of.get(ON_PLANT)) and contest.plant not in of_plants:
             advice = contest.use and Fact("use", **contest.use.values | {"unless": ()})
             ((label, text),) = verdict_lines([fact])
-            undecided = advice and advice.values["rivals"]  # which says all of it
+            undecided = advice and (advice.values.get("rivals") or advice.values.get("level"))
             verdict = None if undecided else f"{label}: {text}"
             if isinstance(fact, Barred):  # as its cells say
                 verdict = text

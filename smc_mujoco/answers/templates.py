@@ -48,8 +48,8 @@ TEXTS = {
     "least": ("", "{law}[ {low:%}]"),
     "use": (
         "",
-        "[Undecided by {metric} between {rivals}. For now|Use] {law}[ ({gains})][, unless "
-        "{unless:; or}].",
+        "[Undecided by {metric} between {rivals}. For now|Level by {metric}: {level}. Use|Use] "
+        "{law}[ ({gains})][, unless {unless:; or}].",
     ),
     "unless": ("", "{aims} matters most: then {law}[ ({gains})]"),
     "of law": ("", "{law} {runs}"),
@@ -106,8 +106,8 @@ TEXTS = {
     "undecided": (
         "Undecided",
         "[{raced} of {named} laws|each law] got [{shorter:shorter set}|{sets:set}][; deciding "
-        "takes {needed}][ ({minutes:minute} more)][{close}, too close for more to tell];[ open "
-        "between {laws};] for now {law}",
+        "takes {least} or more|; deciding takes {needed}][ ({minutes:minute} more)][{close}, too "
+        "close for more to tell];[ open between {laws};] for now {law}",
     ),
     # which: the law
     "gains": ("{law}", f"{{gains}}{IN_FILE}"),

@@ -163,7 +163,7 @@ class Sensitivity(Answer, SobolResult):
             where = _words(self.space, region.cuts)
             outside = Fact("fail", **_rate(region.outside))
             facts.append(Fact("fail where", where=where, outside=outside, **_rate(region.rate)))
-        facts.append(Fact("fail anywhere", fails=self.failed.any() and not self.regions))
+        facts.append(Fact("fail anywhere", fails=bool(self.failed.any()) and not self.regions))
         facts.append(Fact("sentence", label="", text=self.checked))
         return [": ".join(filter(None, line)) for line in lines_of(facts)]
 

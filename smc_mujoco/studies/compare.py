@@ -162,7 +162,9 @@ class Compared(Answer):
         winning = {"--allow-defaults": ""}, "lets a law win over default gains"
         if typed("--gains") == "default":
             winning = {"--gains": None}, "searches gains, so that a law may win"
-        undecided = any(contest.use and contest.use.values["rivals"] for contest in self._contests)
+        undecided = any(
+            contest.use and contest.use.values.get("rivals") for contest in self._contests
+        )
         steps = [
             (not facts, {"--law": ",".join(laws | dict.fromkeys(RIVALS))}, "adds rivals"),
             (barred, *winning),

@@ -161,6 +161,6 @@ def _use(
         law=law,
         gains=gains.get(law),
         unless=unless,
-        rivals=rivals if len(rivals) > 1 else (),
+        **{"level" if isinstance(first, Tied) else "rivals": rivals if len(rivals) > 1 else ()},
         metric=first.metric,
     )

@@ -296,12 +296,12 @@ class Trial(NamedTuple):
                 sets = len(candidate.sets)
             samples.append(min(sets, seeds) if sets > 1 else seeds)
         least = needed_to_win(len(self.plants) * len(self.conditions))
-        if len(samples) < 2 or sorted(samples)[-2] >= least:
+        if len(samples) < 2 or (most := sorted(samples)[-2]) >= least:
             return ""
         where = counted(len(self.conditions), "condition")
         if len(self.plants) > 1:
             where += f" on each of {len(self.plants)} plants"
-        few = f"{max(samples)} sets of gains or runs"
+        few = f"{most} sets of gains or runs"
         return f"{few} cannot rank {len(samples)} laws in {where}; {least} can"
 
     def _check_tunable(

@@ -273,6 +273,7 @@ class Recommendation(Answer):
             raced=len(race.laws) if len(race.laws) < named else None,
             named=named,
             **{"shorter" if race.shorter else "sets": race.sets},
+            least=LOOKS[0] if race.sets < LOOKS[0] else None,
             needed=self.sets_needed if self.sets_needed > race.sets else None,
             minutes=self.minutes_needed,
             close=not self.sets_needed,

@@ -78,6 +78,7 @@ def test_the_law_to_use_comes_with_its_gains_and_the_laws_that_lead_elsewhere():
     assert words.index("adrc") < words.index("wc=30") < words.index("pid") < words.index("sta")
     assert "(" not in text(Fact("use", law="none", gains=None))
     assert text(Fact("use", law="a", rivals=("a", "b"), metric="J")).startswith("Undecided")
+    assert text(Fact("use", law="a", level=("a", "b"), metric="J")) == "Level by J: a and b. Use a."
 
 
 def test_settled_runs_are_counted_by_law():

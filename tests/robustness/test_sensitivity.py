@@ -437,6 +437,8 @@ def test_one_axis_is_named_only_if_the_intervals_part():
     assert "no axis" in dataclasses.replace(result, values=np.ones(32)).sentences[0]
     partly_failed = dataclasses.replace(result, failed=np.arange(32) < 5, regions=())
     assert partly_failed.sentences[2].startswith("fail: 5 of 32 runs (")
+    none_failed = dataclasses.replace(result, failed=np.zeros(32, bool), regions=())
+    assert none_failed.sentences[2].startswith("fail: 0 of 32 runs (")
 
 
 def test_what_cannot_be_answered_is_refused():

@@ -148,6 +148,14 @@ def test_without_J_the_law_for_now_is_the_first_row_of_the_table():
     assert min(LAWS) != LAWS[-1]
 
 
+def test_of_laws_that_are_level_any_may_be_used_and_nothing_is_undecided():
+    boards = leaderboard(table(), ["ultimate_bound"], by=("plant", "condition"))
+    (contest,) = contests(boards, OWN, ())
+    assert contest.use
+    assert sorted(contest.use.values["level"]) == sorted(LAWS)
+    assert "rivals" not in contest.use.values
+
+
 def test_an_own_law_that_loses_has_its_ratio(contest):
     (fact,) = [fact for fact in contest.trails if fact.law == "pid"]
     assert isinstance(fact, Trails)

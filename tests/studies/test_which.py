@@ -244,6 +244,7 @@ def test_each_form_has_its_first_line(raced):
     assert said.startswith("Undecided")
     # minutes: six sets of 90 s, and a fifth more
     assert numbers(said)[:3] == [1, race.LOOKS[0], 11]
+    assert "or more" in said
     starved = raced_laws._replace(unsearched=["adrc", "mpc"])
     form, said = first(race=starved)
     assert form == "undecided"
