@@ -194,8 +194,8 @@ def stream(
 def _by_mechanism(
     scenarios: Iterable[Scenario | Prepared],
 ) -> Iterator[Iterable[tuple[int, Scenario | Prepared]]]:
-    """Yield pairs (index, scenario), of a sequence those of one mechanism together: no other model
-    is then in memory while they run.
+    """Yield pairs (index, scenario), of a sequence those of one own model together: no other such
+    model, which may be large, is then in memory while they run.
     """
     if not isinstance(scenarios, Sequence):
         yield enumerate(scenarios)
@@ -203,7 +203,8 @@ def _by_mechanism(
     groups: dict[Hashable, list[tuple[int, Scenario | Prepared]]] = {}
     for pair in enumerate(scenarios):
         item = pair[1].scenario if isinstance(pair[1], Prepared) else pair[1]
-        key = models.structure(item) if isinstance(item, Scenario) else None
+        own = isinstance(item, Scenario) and item.plant.is_user_model
+        key = models.structure(item) if own else None
         groups.setdefault(key, []).append(pair)
     yield from groups.values()
 

@@ -319,10 +319,12 @@ def options(words: list[str]) -> list[tuple[int, int]]:
 @pytest.mark.quick
 @pytest.mark.usefixtures("folder")
 @pytest.mark.parametrize("line", CALLS)
-def test_every_option_changes_the_argument_of_its_name_and_no_other_to_its_value(line):
+def test_every_option_changes_the_argument_of_its_name_and_no_other_to_its_value(line, monkeypatch):
     """What is done only after the work, such as writing a file, is seen in what commands write,
     below.
     """
+    # the minutes of `which` are those that are left
+    monkeypatch.setattr("smc_mujoco.cli.commands.studies.time.monotonic", lambda: 0.0)
     words = line.split()
     paths = CALLS[line]
     calls = reached(words, paths)

@@ -21,7 +21,7 @@ REPORT = """
 import os, smc_mujoco.common.gl as gl
 gl.choose_gl()
 import mujoco
-print(os.environ.get("MUJOCO_GL"), gl.note(), gl.missing(), sep="\\n")
+print(os.environ.get("MUJOCO_GL"), gl.note(), gl.missing_renderer(), sep="\\n")
 """
 # the dynamic linker's answer on a machine without these libraries
 HIDE = """

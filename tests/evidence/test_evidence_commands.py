@@ -248,7 +248,7 @@ GIVEN = {  # line -> exit code, what is handed on, printed and left, spaces asid
         0,
         [
             "new(Path(mine))",
-            "check(Path(e.json))",
+            "read_sealed(Path(e.json))",
             "wrote mine/claims.py",
             "the seal is whole: A. B and others, C",
             ": 2 supported",

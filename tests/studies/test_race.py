@@ -13,6 +13,7 @@ from smc_mujoco.analysis.ranking import RELEVANT, Comparison
 from smc_mujoco.analysis.tuning.effort import Search
 from smc_mujoco.analysis.tuning.objective import Evaluation, Objective, objectives
 from smc_mujoco.analysis.tuning.result import SearchResult
+from smc_mujoco.answers.facts import Settles
 from smc_mujoco.common.progress import Bar
 from smc_mujoco.simulation.grid import Draws
 from smc_mujoco.studies import race as module
@@ -362,14 +363,17 @@ def test_the_law_to_use_is_the_one_that_runs_name_where_sets_name_none():
         (2, 1, None, ["b", "a"]),
         (1, 0, None, ["a", "b"]),
     ):
-        settled = {"a": {"noise": (of_a, 10)}, "b": {"noise": (of_b, 10)}}
+        settled = {
+            "a": {"noise": Settles(count=of_a, total=10)},
+            "b": {"noise": Settles(count=of_b, total=10)},
+        }
         raced = types.SimpleNamespace(winner=winner, first=["a", "b"])
         assert in_order(settled, fixed, raced) == order
-    assert in_order({"a": {"noise": (10, 10)}}, None, None) == ["a"]
+    assert in_order({"a": {"noise": Settles(count=10, total=10)}}, None, None) == ["a"]
 
 
 def test_where_nothing_decides_a_law_that_rests_comes_before_one_that_shakes():
-    settled = {law: {"noise": (10, 10)} for law in "abc"}
+    settled = {law: {"noise": Settles(count=10, total=10)} for law in "abc"}
     undecided = types.SimpleNamespace(winner=None, first=["a", "b"])
     assert in_order(settled, None, undecided, ["a"]) == ["b", "a", "c"]
     assert in_order(settled, None, undecided, ["a"], {"b": 1, "c": 2}) == ["a", "b", "c"]

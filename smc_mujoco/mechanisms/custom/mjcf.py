@@ -1,5 +1,6 @@
 """Users' models: read from a file, text, MjSpec or PyMJCF, checked, identified by a hash."""
 
+import collections
 import contextlib
 import dataclasses
 import functools
@@ -216,6 +217,7 @@ def _parsed(source: ModelSource) -> mujoco.MjSpec:
 
 
 _unedited: weakref.WeakValueDictionary[ModelSource, mujoco.MjModel] = weakref.WeakValueDictionary()
+_small: collections.deque[mujoco.MjModel] = collections.deque(maxlen=MAX_KEPT)  # that stay
 
 
 def unedited_model(source: ModelSource) -> mujoco.MjModel:
@@ -225,6 +227,8 @@ def unedited_model(source: ModelSource) -> mujoco.MjModel:
         spec = source.spec()
         leave_out_scenery(spec)
         model = _unedited[source] = source.compiled(spec)
+        if mujoco.mj_sizeModel(model) <= mjcb.LARGE:
+            _small.append(model)
     return model
 
 
