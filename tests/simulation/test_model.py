@@ -230,6 +230,10 @@ def test_a_thread_may_keep_its_model_while_another_counts_the_bytes_of_those_kep
     assert not meanwhile
 
 
+OWN = """<mujoco model="own"><worldbody><body><joint name="j" axis="0 1 0"/>
+<geom type="sphere" size=".1" pos="0 0 -.5"/></body></worldbody></mujoco>"""
+
+
 def test_of_large_models_one_is_in_memory_while_runs_and_searches_of_several_are_made(monkeypatch):
     monkeypatch.setattr(model, "MAX_RECENT_BYTES", 0)
     monkeypatch.setattr(evaluator, "LARGE_MODELS", 0)
@@ -250,9 +254,8 @@ def test_of_large_models_one_is_in_memory_while_runs_and_searches_of_several_are
     monkeypatch.setattr(runs.ScenarioBatch, "__init__", noted)
     monkeypatch.setattr(model, "compile_model", alone)
     law = smc.law("observer_free", lam=6.0, k1=3.0)
-    cases = [
-        smc.Scenario(plant="duffing", law=law, duration=0.1, physics_step=h) for h in (1e-3, 5e-4)
-    ]
+    own = smc.plant_from(OWN, {"j": smc.Channel(motor=True, x0=0.3)})
+    cases = [smc.Scenario(plant=own, law=law, duration=0.1, physics_step=h) for h in (1e-3, 5e-4)]
     runs.run_unjudged([*cases, *cases])
     assert together == [(2, 1, 0), (2, 1, 0)]
     together.clear()
