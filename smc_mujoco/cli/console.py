@@ -2,6 +2,7 @@
 
 import contextlib
 import os
+import signal
 import sys
 import time
 from collections.abc import Iterator
@@ -66,7 +67,7 @@ def importing() -> Iterator[None]:
             os.write(2, f"smc-mujoco: {STOPPED}\n".encode())
         leave()
 
-    with handling(stop):
+    with handling(stop, (signal.SIGINT, signal.SIGTERM)):  # others are a caller's own
         yield
 
 

@@ -5,21 +5,23 @@ thread that is waited for.
 import contextlib
 import signal
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 
 NUMBERS = signal.valid_signals()  # asking for them takes longer than to delay them
 
 
 @contextlib.contextmanager
-def handling(handle: Callable[..., object]) -> Iterator[dict[int, Callable[..., object]]]:
-    """Call a function for each signal in a with block in place of its handler. Yield these, by
-    signal.
+def handling(
+    handle: Callable[..., object], numbers: Iterable[int] = NUMBERS
+) -> Iterator[dict[int, Callable[..., object]]]:
+    """Call a function for each of some signals in a with block in place of its handler. Yield
+    these, by signal.
 
     Other threads never receive a signal, so in them there are none.
     """
     handlers = {}
     if threading.current_thread() is threading.main_thread():
-        for number in NUMBERS:
+        for number in numbers:
             if callable(handler := signal.getsignal(number)):
                 handlers[number] = handler
     try:

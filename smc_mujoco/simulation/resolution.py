@@ -37,7 +37,8 @@ def _of_scenario(s: Scenario, chatters: bool) -> Iterator[str]:
     """
     off = "may be some percent off"
     if chatters and coupled(s.plant):  # 0.8, 15 and 23 % of an rms error were seen, and 108 %
-        off = "may be a quarter off, small errors twice too large, as u chatters on coupled joints"
+        off = "may be a quarter off, or a small error twice too large"
+        off += ", as u chatters on coupled joints"
     step = s.resolved.physics_step
     name = s.plant.name
     how = f"{name} runs under {s.resolved.integrator} at {1e3 * step:g} ms"

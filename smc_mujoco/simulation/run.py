@@ -203,8 +203,9 @@ def _by_mechanism(
     groups: dict[Hashable, list[tuple[int, Scenario | Prepared]]] = {}
     for pair in enumerate(scenarios):
         item = pair[1].scenario if isinstance(pair[1], Prepared) else pair[1]
-        own = isinstance(item, Scenario) and item.plant.is_user_model
-        key = models.structure(item) if own else None
+        key = None
+        if isinstance(item, Scenario) and item.plant.is_user_model:
+            key = models.structure(item)
         groups.setdefault(key, []).append(pair)
     yield from groups.values()
 

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from smc_mujoco.cli import console
 from smc_mujoco.cli.console import STOPPED
 from smc_mujoco.common.attended import ENDED_BY_CTRL_C
 
@@ -75,3 +76,16 @@ def test_many_presses_of_ctrl_c_end_a_command_as_one_does(name, tmp_path):
             command.send_signal(signal.SIGINT)
             time.sleep(BETWEEN_PRESSES)
         assert command.wait(60.0) == ENDED_BY_CTRL_C
+
+
+@pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
+def test_a_caller_s_own_signal_reaches_it_while_modules_are_imported(monkeypatch):
+    monkeypatch.setattr(console, "leave", lambda: pytest.fail("the process would have ended"))
+    arrived = []
+    before = signal.signal(signal.SIGUSR1, lambda number, _: arrived.append(number))
+    try:
+        with console.importing():
+            signal.raise_signal(signal.SIGUSR1)
+    finally:
+        signal.signal(signal.SIGUSR1, before)
+    assert arrived == [signal.SIGUSR1]
