@@ -119,6 +119,7 @@ TEXTS = {
         "settles",
         "{runs} runs[, in {times} s][; all conditions at once {together}]",
     ),
+    "added": ("added", "{condition}, to J and gains, as no condition asked for has noise"),
     "withstands": (
         "withstands",
         "[{levels:,}; no time for {untried}|{levels:,}|no time for {untried}]",

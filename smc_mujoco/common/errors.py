@@ -17,9 +17,10 @@ from typing import Any, TypeVar
 T = TypeVar("T")
 MAX_NAME = 100  # characters: chosen, for tables and figures
 MAX_ITEMS = 1_000_000  # items of a list that a user gives, and runs of a grid: chosen
-MAX_LISTED = 12  # names that a refusal lists, where `list` has them; chosen
+MAX_LISTED = 12  # names that a refusal lists, where all stand elsewhere; chosen
 MAX_LETTERS = 1100  # of these names
 IN_LIST = ("law", "plant", "surface", "scene", "condition", "metric")  # kinds of `list`
+PLACES = {"word": "docs/words.md"} | {kind: f"smc-mujoco list {kind}s" for kind in IN_LIST}
 MAX_MESSAGE = 1500  # characters of a message, which may hold a long path: chosen
 END_OF_MESSAGE = 500  # characters of a longer message that are kept at its end, with the cure
 MAX_MEANT = 3  # names that a word of them may mean: chosen
@@ -91,14 +92,14 @@ def _brief(value: object) -> str:
 def unknown(kind: str, name: object, known: Iterable[str]) -> ScenarioError:
     """Return the error for a name that is not in `known`.
 
-    It suggests the nearest name, or lists all names; of many in a list of the shell, three.
+    It suggests the nearest name, or lists all names; of many that stand elsewhere, three.
     """
     # claims have numbers
     names = sorted(known, key=lambda text: (int(text) if text.isdecimal() else -1, text))
     hint = "there are none with a name"
-    if kind in IN_LIST and isinstance(name, str) and len(names) > MAX_LISTED:
+    if kind in PLACES and isinstance(name, str) and len(names) > MAX_LISTED:
         near = difflib.get_close_matches(name, names, n=MAX_MEANT, cutoff=0.0)
-        hint = f"near it are {', '.join(near)}; smc-mujoco list {kind}s has all"
+        hint = f"near it are {', '.join(near)}; {PLACES[kind]} has all"
     elif names:
         hint = f"choose from {one_line(', '.join(names), MAX_LETTERS)}"
     if isinstance(name, str) and (near := _nearest(name, names)):

@@ -197,9 +197,10 @@ def outside(scenario: Scenario, within: Uncertainty) -> str:
         return "; ".join(reasons)
     admits = scenario.law.template.admits
     gains = SimpleNamespace(**next(iter(scenario.law.of_channels(scenario.plant.driven))).gains)
-    for name, value in {"d": disturbance, "d'": slope}.items():
+    of_disturbance = ("d", disturbance, "disturbance"), ("d'", slope, "disturbance's rate")
+    for name, value, words in of_disturbance:
         if disturbance and name in admits and value >= admits[name](gains):
-            reasons.append(f"{name} exceeds the bound of the law's theorem")
+            reasons.append(f"the {words} exceeds the bound of the law's theorem")
     beside = (
         within.delay[1] or scenario.input_delay,
         within.position_noise or within.velocity_noise or scenario.noise != Noise(),

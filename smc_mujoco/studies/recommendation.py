@@ -306,6 +306,7 @@ class Recommendation(Answer):
         facts.append(Fact("settles", runs=self.runs, times=times, together=self.together))
         margins = [margin for margin in self.margins if not math.isnan(margin.value)]
         levels = list(map(_level, margins))
+        facts += [Fact("added", condition=noise.condition) for noise in self.noises if noise.added]
         if levels or self.tolerance.untried:
             facts.append(Fact("withstands", levels=levels, untried=self.tolerance.untried))
         if none and form != "unneeded":

@@ -307,10 +307,18 @@ def test_bad_values_get_a_sentence(refused):
     ("change", "bounds", "expected"),
     [
         ({}, {"disturbance": 1.8}, ""),
-        ({}, {"disturbance": 2.0}, "d exceeds"),
-        ({}, {"disturbance": 6.0}, "the disturbance exceeds what the drives hold; d exceeds"),
-        ({"law": smc.law("super_twisting", k2=8.0)}, {"disturbance": 2.0, "slope": 8.0}, "d' exc"),
-        ({"disturbance": (smc.Constant(0.5), smc.Sine(-1.0, 2.0))}, {"disturbance": 0.5}, "d exc"),
+        ({}, {"disturbance": 2.0}, "the disturbance exceeds the bound of"),
+        ({}, {"disturbance": 6.0}, "the disturbance exceeds what the drives hold; the"),
+        (
+            {"law": smc.law("super_twisting", k2=8.0)},
+            {"disturbance": 2.0, "slope": 8.0},
+            "the disturbance's rate exc",
+        ),
+        (
+            {"disturbance": (smc.Constant(0.5), smc.Sine(-1.0, 2.0))},
+            {"disturbance": 0.5},
+            "the disturbance exc",
+        ),
         ({"input_delay": 0.002}, {"x0": 0.1}, "the law's theorem has no delay"),
         ({"clock": smc.Clock(missed=0.1)}, {"x0": 0.1}, "the law's theorem has no delay"),
     ],
