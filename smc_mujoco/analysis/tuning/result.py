@@ -13,7 +13,6 @@ from smc_mujoco.answers.command import again, instead, typed
 from smc_mujoco.answers.facts import Fact, NextStep, Screen
 from smc_mujoco.common.aliases import AnyPath, Data, Fields
 from smc_mujoco.common.data import keyword_dataclass
-from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.files import read_json, reading, sealed, unsealed, with_ending, write_json
 from smc_mujoco.common.tabular import Tabular
 from smc_mujoco.common.text import counted
@@ -22,8 +21,6 @@ from smc_mujoco.control.component import Component
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation import scenario_json
 
-# equal in tunings that are compared
-COMPARED_FIELDS = "rule", "plant", "definition", "budget", "seed", "versions"
 FAR_APART = 1.0  # a spread of J beyond which a search was stuck, as in a race
 RIVALS = ("pid", "adrc")
 HEADINGS = ("gain", "tuned", "searched from", "to", "")  # of a tuning's table
@@ -284,23 +281,3 @@ def load_tuned(path: AnyPath, plant: Plant | None = None) -> Tuned:
             plant=scenario.plant,
             definition=restored_objective(data["definition"]),
         )
-
-
-def compare_tunings(tuned: Sequence[Tuned]) -> list[Tuned]:
-    """Return the tunings, best first. Raise ScenarioError unless all were made in the same way."""
-    if not tuned:
-        raise ScenarioError("cannot compare []: give a list of tunings")
-    first = tuned[0]
-    for tuning in tuned:
-        for name in COMPARED_FIELDS:
-            if getattr(tuning, name) != getattr(first, name):
-                raise ScenarioError(
-                    f"{tuning.law.name} and {first.law.name} were tuned with another {name}: tune "
-                    "them in the same way"
-                )
-        if len(tuning.searches) != len(first.searches):
-            raise ScenarioError(
-                f"{tuning.law.name} and {first.law.name} were tuned in unequal numbers of "
-                "searches: tune them in the same way"
-            )
-    return sorted(tuned, key=lambda tuning: tuning.objective)

@@ -16,7 +16,7 @@ from smc_mujoco.analysis.engine import scored_runs
 from smc_mujoco.analysis.tuning import search, search_space, stages
 from smc_mujoco.analysis.tuning.evaluator import EQUATION, MUJOCO
 from smc_mujoco.analysis.tuning.objective import FAILURE_COST, Objective
-from smc_mujoco.analysis.tuning.result import compare_tunings, load_tuned
+from smc_mujoco.analysis.tuning.result import load_tuned
 from smc_mujoco.analysis.tuning.search import tune
 from smc_mujoco.control.law import law_catalogue
 from smc_mujoco.control.units import Gain, Unit
@@ -557,26 +557,6 @@ def test_a_run_that_fails_costs_more_than_any_other_and_less_the_later_it_fails(
     assert costs == sorted(costs, reverse=True)
     assert len(set(costs)) == 5
     assert costs[-1] < 1.0 < FAILURE_COST <= costs[-2]
-
-
-# equal terms
-
-
-def test_a_law_that_got_more_than_its_rivals_is_not_compared(found, refused):
-    rival = dataclasses.replace(found, law=smc.law("classical"))
-    assert {candidate.law.name for candidate in compare_tunings([rival, found])} == {
-        "classical",
-        "observer_free",
-    }
-    for changed in (
-        {"budget": 17},
-        {"searches": rival.searches[:2]},
-        {"definition": Objective(duration=0.5, u_max=12.0)},
-        {"plant": smc.plant("duffing", M=2.0)},
-    ):
-        (name,) = changed
-        unequal = dataclasses.replace(rival, **changed)
-        refused(lambda unequal=unequal: compare_tunings([found, unequal]), name)
 
 
 # files
