@@ -124,7 +124,7 @@ TEXTS = {
         "withstands",
         "[{levels:,}; no time for {untried}|{levels:,}|no time for {untried}]",
     ),
-    "level": ("", "{what} [x {open}{factor}|{open}{time:ms}|{open}{value} {unit}]"),
+    "level": ("", "{what}[{open} ≥] [x {factor}|{time:ms}|{value} {unit}]"),
     "without": ("without a law", "{runs} runs settle[; the law's J is {below:%} below]"),
     # which: what to know before use
     "rare": ("beware", "{runs} runs settle under {where}"),

@@ -641,7 +641,7 @@ def _level(margin: Margin) -> Fact:
     """Return a level that is withstood, such as "mass x 1.6"."""
     in_unit = {"1": "factor", "s": "time"}.get(margin.unit, "value")
     about = {"what": LEVELS.get(margin.kind, margin.kind), "unit": margin.unit}
-    return Fact("level", **about, open="≥ " if margin.open else True, **{in_unit: margin.value})
+    return Fact("level", **about, open=margin.open, **{in_unit: margin.value})
 
 
 def _summed(runs: Iterable[Settles]) -> Settles:
