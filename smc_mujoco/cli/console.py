@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 
-from smc_mujoco.common.attended import ENDED_BY_CTRL_C, leave
+from smc_mujoco.common.attended import ENDED_BY_CTRL_C, STOPPED, raising, stop_at_once
 from smc_mujoco.common.errors import ScenarioError, printable
 from smc_mujoco.common.files import to_json, with_ending, writable, write_json
 from smc_mujoco.common.interrupts import handling
@@ -20,8 +20,6 @@ from smc_mujoco.common.scripts import users_traceback
 if TYPE_CHECKING:
     from smc_mujoco.answers.answer import Answer
 
-STOPPED = "stopped. A command that keeps a folder goes on from it if you run it again."
-
 
 @contextlib.contextmanager
 def errors_as_sentences() -> Iterator[None]:
@@ -29,7 +27,8 @@ def errors_as_sentences() -> Iterator[None]:
     if it fails.
     """
     try:
-        yield
+        with raising():
+            yield
     except ScenarioError as error:
         _fail(str(error))
     except BrokenPipeError:  # the reader has closed the pipe, as head does
@@ -61,13 +60,7 @@ def importing() -> Iterator[None]:
     """Let Ctrl-C end the command at once in a with block that only imports: the rest of it may take
     seconds, and a library that is half imported crashes.
     """
-
-    def stop(*_: object) -> None:
-        with contextlib.suppress(OSError):
-            os.write(2, f"smc-mujoco: {STOPPED}\n".encode())
-        leave()
-
-    with handling(stop, (signal.SIGINT, signal.SIGTERM)):  # others are a caller's own
+    with handling(stop_at_once, (signal.SIGINT, signal.SIGTERM)):  # others are a caller's own
         yield
 
 

@@ -15,14 +15,15 @@ import signal
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from typing import Any, NoReturn
 
-from smc_mujoco.common.interrupts import delay_signals
+from smc_mujoco.common.interrupts import delay_signals, handling
 
 PATIENCE = 0.5  # s that threads have to end after they were asked to stop: chosen
 POLL = 0.05  # s between looks at the signals
 ENDED_BY_CTRL_C = 130  # the exit code of a shell's command that Ctrl-C ended
+STOPPED = "stopped. A command that keeps a folder goes on from it if you run it again."
 
 _running: dict[threading.Thread, Callable[[], None]] = {}  # thread -> what asks it to stop
 
@@ -82,6 +83,31 @@ def _ignore_ctrl_c() -> None:
     """Let a Ctrl-C from now on interrupt nothing. One that has come already may be raised here."""
     if threading.current_thread() is threading.main_thread():
         signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
+def end_at_ctrl_c() -> None:
+    """Let Ctrl-C end the process at once, but where `raising` lets it raise. Of a process that
+    ignores it nothing changes.
+    """
+    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
+        signal.signal(signal.SIGINT, stop_at_once)
+
+
+@contextlib.contextmanager
+def raising() -> Iterator[None]:
+    """Let Ctrl-C raise KeyboardInterrupt in a with block, also in a process that it ends at
+    once.
+    """
+    ends = signal.getsignal(signal.SIGINT) is stop_at_once
+    with handling(signal.default_int_handler, [signal.SIGINT] if ends else []):
+        yield
+
+
+def stop_at_once(*_: object) -> NoReturn:
+    """Say that the command was stopped, and end the process: the handler of a signal."""
+    with contextlib.suppress(OSError):
+        os.write(2, f"smc-mujoco: {STOPPED}\n".encode())
+    leave()
 
 
 @atexit.register  # when this is imported, so that it is called after the handlers of others

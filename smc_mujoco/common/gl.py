@@ -22,8 +22,6 @@ import warnings
 import weakref
 from typing import TYPE_CHECKING
 
-from smc_mujoco.common import process
-
 if TYPE_CHECKING:
     import mujoco
     import numpy as np
@@ -157,6 +155,8 @@ def probe(backend: str, code: str = PROBE) -> str | None:
     """Return None if a new process can run some code with a backend, else the last line of its
     error.
     """
+    from smc_mujoco.common import process
+
     environment = {"MUJOCO_GL": backend} if backend else {}
     command = [sys.executable, "-W", "ignore", "-c", code]
     try:

@@ -11,8 +11,7 @@ from pathlib import Path
 import pytest
 
 from smc_mujoco.cli import console
-from smc_mujoco.cli.console import STOPPED
-from smc_mujoco.common.attended import ENDED_BY_CTRL_C
+from smc_mujoco.common.attended import ENDED_BY_CTRL_C, STOPPED
 
 ROOT = Path(__file__).parents[2]
 BETWEEN_PRESSES = 0.02  # s
@@ -28,11 +27,22 @@ COMMANDS = {
 }
 
 
+WAITING = "print(flush=True); signal.pause(); print('went on')"
+IMPORTING = f"""from smc_mujoco.cli.console import importing
+with importing(): {WAITING}"""
+BEFORE = f"""from types import ModuleType
+from smc_mujoco.__main__ import main
+class Imported(ModuleType):
+    def __getattr__(self, name): {WAITING}
+sys.modules["smc_mujoco.cli.main"] = Imported("smc_mujoco.cli.main")
+main()"""
+
+
 @pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
-def test_ctrl_c_ends_a_command_that_still_imports_at_once():
+@pytest.mark.parametrize("imports", [IMPORTING, BEFORE], ids=["a command", "the program"])
+def test_ctrl_c_ends_what_still_imports_at_once(imports):
     code = "import signal, sys; signal.signal(signal.SIGINT, signal.default_int_handler)\n"
-    code += "from smc_mujoco.cli.console import importing\n"
-    code += "with importing():\n    print(flush=True)\n    signal.pause()\n    print('went on')"
+    code += imports
     with subprocess.Popen(
         [sys.executable, "-c", code],
         env=os.environ | {"PYTHONPATH": str(ROOT)},
@@ -60,7 +70,7 @@ def test_many_presses_of_ctrl_c_end_a_command_as_one_does(name, tmp_path):
     environment = os.environ | {"PYTHONPATH": str(ROOT), "XDG_CACHE_HOME": str(tmp_path / "cache")}
     code = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)\n"
     code += f"import sys; sys.argv[1:] = {COMMANDS[name]!r}\n"
-    code += "from smc_mujoco.cli.main import main; main()"
+    code += "from smc_mujoco.__main__ import main; main()"
     with subprocess.Popen(
         [sys.executable, "-c", code],
         cwd=tmp_path,
@@ -80,7 +90,9 @@ def test_many_presses_of_ctrl_c_end_a_command_as_one_does(name, tmp_path):
 
 @pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
 def test_a_caller_s_own_signal_reaches_it_while_modules_are_imported(monkeypatch):
-    monkeypatch.setattr(console, "leave", lambda: pytest.fail("the process would have ended"))
+    monkeypatch.setattr(
+        console, "stop_at_once", lambda *_: pytest.fail("the process would have ended")
+    )
     arrived = []
     before = signal.signal(signal.SIGUSR1, lambda number, _: arrived.append(number))
     try:
