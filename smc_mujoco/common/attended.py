@@ -91,6 +91,14 @@ def end_at_ctrl_c() -> None:
     """
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
         signal.signal(signal.SIGINT, stop_at_once)
+        sys.unraisablehook = _stop_if_lost
+
+
+def _stop_if_lost(unraisable: "sys.UnraisableHookArgs") -> None:
+    """End at a Ctrl-C that was raised where Python drops what is raised, as in a finalizer."""
+    if issubclass(unraisable.exc_type, KeyboardInterrupt):
+        stop_at_once()
+    sys.__unraisablehook__(unraisable)
 
 
 @contextlib.contextmanager

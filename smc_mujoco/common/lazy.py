@@ -8,8 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
 
-from smc_mujoco.common import annexes, gl
-from smc_mujoco.common.interrupts import delay_signals
+from smc_mujoco.common import annexes
 
 NAMES = re.compile(r"^from (\S+) import (\w+) as \2$", re.MULTILINE)
 ALIASES = re.compile(r"^(\w+) = (smc_mujoco\.\S+)$", re.MULTILINE)
@@ -50,7 +49,10 @@ def lazy_module(package: str) -> LazyModule:
             raise AttributeError(
                 f"module {package!r} has no attribute {name!r}{MOVED.get(name, '')}"
             )
-        gl.mend_gl()
+        from smc_mujoco.common.gl import mend_gl
+        from smc_mujoco.common.interrupts import delay_signals
+
+        mend_gl()
         with delay_signals():
             what = f"{package.replace('smc_mujoco', 'smc', 1)}.{name}"
             module = annexes.module(modules.get(name) or origins[name], what)

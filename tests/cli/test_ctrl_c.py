@@ -30,19 +30,30 @@ COMMANDS = {
 WAITING = "print(flush=True); signal.pause(); print('went on')"
 IMPORTING = f"""from smc_mujoco.cli.console import importing
 with importing(): {WAITING}"""
-BEFORE = f"""from types import ModuleType
+PROGRAM = f"""from types import ModuleType
 from smc_mujoco.__main__ import main
+from smc_mujoco.common.attended import raising
+class Dropped:
+    def __del__(self): {WAITING}
+def run():
+    with raising(): Dropped()
 class Imported(ModuleType):
-    def __getattr__(self, name): {WAITING}
+    def __getattr__(self, name):
+        {{}}
+        return run
 sys.modules["smc_mujoco.cli.main"] = Imported("smc_mujoco.cli.main")
 main()"""
 
 
 @pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
-@pytest.mark.parametrize("imports", [IMPORTING, BEFORE], ids=["a command", "the program"])
-def test_ctrl_c_ends_what_still_imports_at_once(imports):
+@pytest.mark.parametrize(
+    "waits",
+    [IMPORTING, PROGRAM.format(WAITING), PROGRAM.format("pass")],
+    ids=["a command's imports", "the program's imports", "a finalizer"],
+)
+def test_ctrl_c_ends_at_once_what_cannot_raise_it(waits):
     code = "import signal, sys; signal.signal(signal.SIGINT, signal.default_int_handler)\n"
-    code += imports
+    code += waits
     with subprocess.Popen(
         [sys.executable, "-c", code],
         env=os.environ | {"PYTHONPATH": str(ROOT)},
