@@ -2,12 +2,14 @@
 
 from collections.abc import Sequence
 from contextvars import ContextVar
+from itertools import pairwise
 from typing import Any
 
 from typer import BadParameter
 from typer.core import TyperCommand, TyperOption
 
 from smc_mujoco.answers import command
+from smc_mujoco.common.text import real
 
 ALL = "--help-all"
 ASKED, GAINS, OUTPUT, RARE = "What is asked", "Runs and gains", "Output", "Rarely used"
@@ -29,14 +31,23 @@ class GroupedCommand(TyperCommand):
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Parse the words of the command line, and remember which options take no value."""
         flags: list[str] = []
+        names = {}  # option -> parameter of the command's function
         for param in self.get_params(ctx):
             if getattr(param, "is_flag", False):
                 flags += [*param.opts, *param.secondary_opts]
+            else:
+                names |= dict.fromkeys(param.opts, param.name)
         command.remember_flags(flags)
-        for text in (word.rpartition("=")[2].strip() for word in args):
-            if not text.isascii() and text.replace(".", "").isdecimal():  # a number to Python
-                raise BadParameter(f"{text} is no number here: write it in the digits 0 to 9", ctx)
-        return super().parse_args(ctx, args)
+        words = [part for word in args for part in word.split("=", 1)]
+        rest = super().parse_args(ctx, args)
+        for option, text in pairwise(words):
+            if isinstance(ctx.params.get(names.get(option)), int | float):
+                try:
+                    real(text)
+                except ValueError:
+                    said = f"{text} is no number here: write it in the digits 0 to 9"
+                    raise BadParameter(said, ctx) from None
+        return rest
 
     def get_params(self, ctx: Any) -> list[Any]:
         """Return the options and arguments, each option with its group."""

@@ -425,6 +425,14 @@ def test_the_calls_above_have_every_option_of_their_commands():
         assert [option for option in options if not option & words] == [], name
 
 
+@pytest.mark.parametrize("typed", [["--duration", "1_0"], ["--seeds=1_0"], ["--duration", "٣"]])
+def test_a_number_is_written_in_the_digits_0_to_9_alone(typed, capsys):
+    with pytest.raises(SystemExit) as ended:
+        main.main(["compare", "duffing", *typed])
+    assert ended.value.code == 2
+    assert typed[-1].removeprefix("--seeds=") in capsys.readouterr().err
+
+
 def test_the_least_number_that_an_option_takes_is_the_least_that_its_function_takes():
     compared = 0
     for line, path in {(line.split()[0], paths[-1]) for line, paths in CALLS.items()}:
