@@ -271,8 +271,8 @@ def sealed(data: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def unsealed(data: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the data of a JSON file; ScenarioError if it has a seal, and it is that of others."""
-    if "seal" in data and data["seal"] != _seal(data):
+    """Return the data of a JSON file; ScenarioError if its seal is not theirs."""
+    if data.get("seal") != _seal(data):
         raise ScenarioError(CHANGED)
     return dict(data)
 

@@ -1,12 +1,12 @@
 """Laws as text: names, gains in brackets, and files, at every door that takes a law."""
 
 import copy
-import json
 from pathlib import Path
 
 import pytest
 
 import smc_mujoco as smc
+from smc_mujoco.common.files import sealed, write_json
 from smc_mujoco.control import surface
 from smc_mujoco.control.from_text import component, parsed_gains
 from smc_mujoco.simulation import scenario_json
@@ -28,9 +28,17 @@ usual = smc.law("pid")
 law = its = smc.law_function(lambda y, gains, memory: (-2.0 * y.e, y.e))().named("theirs")
 """
 
-TUNED = """{"scenario": {"source": null, "law": {
-  "name": "mine", "module": "mine", "gains": {"k": 7.0, "c": 1.5}, "memory": 0, "degree": 1},
-  "plant": {"name": "duffing", "module": "smc_mujoco.mechanisms.plants.duffing"}}}"""
+TUNED = {
+    "source": None,
+    "law": {"name": "mine", "module": "mine", "gains": {"k": 7.0, "c": 1.5}}
+    | {"memory": 0, "degree": 1},
+    "plant": {"name": "duffing", "module": "smc_mujoco.mechanisms.plants.duffing"},
+}
+
+
+def write_tuning(path, scenario):
+    """Write what counts of a tuning."""
+    write_json(Path(path), sealed({"scenario": scenario}))
 
 
 @pytest.fixture
@@ -42,7 +50,7 @@ def files(tmp_path, monkeypatch):
     (tmp_path / "bound.py").write_text(MINE + "law = mine(k=3.0)\n")
     (tmp_path / "two.py").write_text(MINE + MINE.replace("mine", "other"))
     (tmp_path / "notes.txt").write_text("pid")
-    (tmp_path / "mine.json").write_text(TUNED)
+    write_tuning(tmp_path / "mine.json", TUNED)
     (tmp_path / "empty.json").write_text("{}")
     return tmp_path
 
@@ -96,11 +104,11 @@ SHIPPED = scenario_json.describe(
     ],
 )
 def test_a_tuning_that_lost_something_is_refused(files, change, words):
-    Path("good.json").write_text(json.dumps({"scenario": SHIPPED}))
+    write_tuning("good.json", SHIPPED)
     assert smc.law("good.json").source.kind == "shipped"
     data = copy.deepcopy(SHIPPED)
     change(data)
-    Path("bad.json").write_text(json.dumps({"scenario": data}))
+    write_tuning("bad.json", data)
     with pytest.raises(smc.ScenarioError, match=words):
         smc.law("bad.json")
 
@@ -109,9 +117,23 @@ def test_a_tuning_of_another_law_is_refused(files):
     Path("other.py").write_text(MINE.replace("mine", "other"))
     with pytest.raises(smc.ScenarioError, match="gains of law 'mine', and other"):
         smc.law("other.py(mine.json)")
-    Path("less.json").write_text(TUNED.replace('"k"', '"q"'))
+    less = copy.deepcopy(TUNED)
+    less["law"]["gains"] = {"q": 7.0, "c": 1.5}
+    write_tuning("less.json", less)
     with pytest.raises(smc.ScenarioError, match="lacks k"):
         smc.law("mine.py(less.json)")
+
+
+@pytest.mark.parametrize(
+    ("written", "typed"),
+    [('"k": 7.0', '"k": -7.0'), ('"k": 7.0', '"k": 7.0, "k": 5.0'), ('"seal"', '"sealed"')],
+)
+def test_a_tuning_in_which_somebody_wrote_is_refused(files, written, typed):
+    text = Path("mine.json").read_text()
+    assert text.count(written) == 1
+    Path("mine.json").write_text(text.replace(written, typed))
+    with pytest.raises(smc.ScenarioError, match=r"mine\.json .*was changed, since it was written"):
+        smc.law("mine.py(mine.json)")
 
 
 @pytest.mark.slow
