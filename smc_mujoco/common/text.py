@@ -2,9 +2,11 @@
 
 import dataclasses
 import math
+import re
 from collections.abc import Iterable
 from typing import Any
 
+UNDERSCORED = re.compile(r"(?<![\w.])\.?\d[\d.]*_")  # a number as 1_0, in a text that Python reads
 LEAST_PRINTED = 1e-9  # smaller numbers are not printed digit by digit
 
 

@@ -25,6 +25,7 @@ from smc_mujoco.common.aliases import Data
 from smc_mujoco.common.errors import ScenarioError, find, shown, warn_once
 from smc_mujoco.common.files import read_json, reading, unsealed
 from smc_mujoco.common.scripts import IN_FILE, execute, object_named
+from smc_mujoco.common.text import UNDERSCORED
 from smc_mujoco.control import component_json, gain_sets
 from smc_mujoco.control.component import Component, GainValue, Template
 from smc_mujoco.control.law import Law, all_laws
@@ -169,7 +170,7 @@ def _parts(kind: str, text: str, example: str) -> tuple[str, dict[str, GainValue
 def _gains(text: str) -> dict[str, GainValue]:
     """Return the gains in a text such as "kp=50, ki=(1, 2)"; one of UNREADABLE for another text."""
     call = ast.parse(f"f({text})", mode="eval").body
-    if not isinstance(call, ast.Call) or call.args:
+    if not isinstance(call, ast.Call) or call.args or UNDERSCORED.search(text):
         raise ValueError
     gains: dict[str, GainValue] = {}
     for word in call.keywords:

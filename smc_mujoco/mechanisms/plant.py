@@ -211,7 +211,7 @@ class Plant:
         """Return what a parameter may be."""
         if parameter in self.positive:
             low = TINY if parameter in self.above_zero else 1e-6
-        elif parameter in (*self.dry, *self.added):
+        elif parameter in (*self.dry, *self.added) or "." in parameter:  # of a user's joint or body
             low = 0.0
         else:
             low = -MAX_PARAMETER
@@ -372,10 +372,7 @@ class Plant:
             else:
                 values[name] = values[name] * factor
         for name, value in values.items():
-            too_low = (value <= 0.0 and name in self.positive) or (
-                value < 0.0 and name in self.added
-            )
-            if not abs(value) <= MAX_PARAMETER or too_low:
+            if not self.constraint(name).low <= value <= MAX_PARAMETER:
                 raise ScenarioError(
                     f"{self.name}'s true {name} becomes {value:g}: give other factors"
                 )

@@ -17,7 +17,7 @@ from smc_mujoco.common.aliases import Data
 from smc_mujoco.common.errors import ScenarioError, find, shown
 from smc_mujoco.common.registry import subclasses
 from smc_mujoco.common.scripts import IN_FILE, WITHIN, object_named, script_place
-from smc_mujoco.common.text import stated
+from smc_mujoco.common.text import UNDERSCORED, stated
 from smc_mujoco.control.component import Component, Template
 from smc_mujoco.control.estimator import estimator_catalogue as estimators
 from smc_mujoco.mechanisms.hardware import obstacles, servos  # noqa: F401
@@ -40,6 +40,8 @@ def read_fields(text: str) -> dict[str, Any]:
     No text is run, but a file is whose part the text names, as "friction=my_parts.py:stribeck()".
     """
     quoted = FILES.sub(_in_quotes, text)
+    if UNDERSCORED.search(FILES.sub("", text)):
+        raise SyntaxError
     try:
         call = ast.parse(f"_({quoted})", mode="eval").body
     except (ValueError, RecursionError, MemoryError):
@@ -72,9 +74,9 @@ def _parsed(node: ast.expr) -> Any:  # noqa: PLR0911  # a table
         case ast.Dict(keys=keys, values=values) if None not in keys:
             parsed = {}
             for key, value in zip(keys, values, strict=True):
-                if key is not None:
-                    parsed[_parsed(key)] = _parsed(value)
-            return parsed
+                if key is not None and parsed.setdefault(_parsed(key), value) is not value:
+                    raise _twice(ast.unparse(key), node)
+            return {key: _parsed(value) for key, value in parsed.items()}
         case ast.BinOp(left=left, op=ast.Add(), right=right):
             first = _parsed(left)
             second = _parsed(right)
@@ -128,10 +130,14 @@ def _keywords(node: ast.Call) -> dict[str, Any]:
     keywords: dict[str, Any] = {}
     for word in node.keywords:
         if str(word.arg) in keywords:
-            call = shown(ast.unparse(node).removeprefix("_"))
-            raise ScenarioError(f"condition has {word.arg} twice, in {call}: give it once")
+            raise _twice(str(word.arg), node)
         keywords[str(word.arg)] = _parsed(word.value)
     return keywords
+
+
+def _twice(name: str, node: ast.expr) -> ScenarioError:
+    text = shown(ast.unparse(node).removeprefix("_"))
+    return ScenarioError(f"condition has {name} twice, in {text}: give it once")
 
 
 def _kinds() -> dict[str, Any]:

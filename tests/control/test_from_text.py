@@ -171,7 +171,7 @@ NAMED = {
     "mine.json": "law mine of mine.json",
 }
 NAMED |= {"\0": r"'\x00'"}
-GAINS = ("lam", "lam=", "3=4", "lam=x", "a=1,a=2")
+GAINS = ("lam", "lam=", "3=4", "lam=x", "lam=1_0", "a=1,a=2")
 
 
 def test_other_texts_are_one_sentence(files, refused):

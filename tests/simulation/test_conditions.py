@@ -123,6 +123,8 @@ def test_a_text_that_is_none_is_one_sentence(refused):
         ("worn: x0=1, x0=2", "x0 twice"),
         ("worn: friction=Coulomb(level=1, level=2)", "level twice"),
         ("worn: mismatch={'mass': 1.3, **{'mass': 2}}", "**{'mass': 2}"),
+        ("worn: mismatch={'mass': 1.3, 'mass': 2}", "'mass' twice"),
+        ("worn: x0=1_0", "x0=1_0"),
         (": input_delay=0.01", "name is ''"),
         ("noise: input_delay=0.01", "'noise'"),
         ("noisy", "'noisy'"),

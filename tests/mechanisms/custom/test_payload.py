@@ -60,12 +60,13 @@ def test_a_law_does_not_know_of_a_payload(arm):
     np.testing.assert_array_equal(light.u[0], heavy.u[0])
 
 
-def test_a_payload_that_no_body_can_have_is_refused(arm):
+def test_a_payload_or_a_damping_that_no_machine_can_have_is_refused(arm):
     for name, words in (("hnd", "did you mean 'hand.payload'"), ("world", "unknown parameter")):
         with pytest.raises(smc.ScenarioError, match=words):
             smc.Scenario(plant=arm, mismatch={f"{name}.payload": 1.0}, **RUN)
-    with pytest.raises(smc.ScenarioError, match=r"becomes -0\.1: give other"):
-        smc.Scenario(plant=arm, mismatch={"hand.payload": -0.1}, **RUN)
+    for name in ("hand.payload", "bend.damping"):  # the model has none of one, some of the other
+        with pytest.raises(smc.ScenarioError, match=rf"true {name} becomes -\S+: give other"):
+            smc.Scenario(plant=arm, mismatch={name: -0.1}, **RUN)
 
 
 def test_an_adversary_chooses_a_payload_and_a_friction_of_an_own_model(arm):
