@@ -49,6 +49,7 @@ CURES = {  # words of MuJoCo's message on a file -> what to do
     "mass and inertia": "give that body a mass and an inertia (<inertial>)",
     "not found Element 'plugin'": "load its library before (mujoco.mj_loadPluginLibrary)",
     "must be positive in geom": "give its shapes sizes above 0, or delete them",
+    "surrogates not allowed": "rename it, or its folder, in UTF-8",
     "positive eigenvalues": "give that body three moments of inertia above 0",
 }
 FROM_MUJOCO = ValueError, RuntimeError, mujoco.FatalError  # what it raises on a model
@@ -162,6 +163,7 @@ class ModelSource:
             texts = [content for content in contents if _is_text(content)]
         file_numbers.check_texts(self.label, texts)
         try:
+            self.path.encode()  # MuJoCo reads a path in UTF-8
             if not self.path:
                 spec = mujoco.MjSpec.from_string(
                     self.text, include=included or None, assets=dict(self.assets)

@@ -6,9 +6,11 @@ import collections
 import dataclasses
 import importlib.util
 import math
+import os
 import pickle
 import re
 import shutil
+import sys
 import warnings
 from pathlib import Path
 from typing import Any
@@ -839,6 +841,15 @@ def test_a_broken_file_that_is_included_is_one_sentence(arm, tmp_path):
         smc.ScenarioError, match=r"MuJoCo cannot read \S*arm.xml \(.*\): fix the file$"
     ):
         arm(rest='<include file="part.xml"/>')
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="a name that is no UTF-8")
+def test_a_model_in_a_folder_whose_name_is_no_utf_8_is_one_sentence(tmp_path):
+    file = tmp_path / os.fsdecode(b"\xff") / "arm.xml"
+    file.parent.mkdir()
+    file.write_text("<mujoco/>")
+    with pytest.raises(smc.ScenarioError, match="MuJoCo cannot read .*: rename it, or its folder"):
+        smc.plant_from(file, joints=["j"])
 
 
 # models that harm a run
