@@ -244,18 +244,17 @@ def race(course: RaceCourse, entrants: Sequence[Entrant], relevant: float) -> Ra
     dropped: dict[str, float] = {}
     comparison, looked = None, 0
     stopped = False
-    laws = [entrant for entrant in entrants if entrant.searched]
+    laws = [*searched_laws(entrants)]
     count = len(entrants)
     with bar(SETS, LOOKS[0] * count, course.trial.progress, counted=True) as progress:
         progress.latest = clock.ends
-        begin = time.monotonic()
         in_folder = _are_kept(
             course, [RaceSearch(entrant, 0) for entrant in searched_laws(entrants)]
         )
         everyone = _first_sets(course, entrants, progress)
         running = dict(everyone)
         # s that a law took in each round
-        rounds = [] if in_folder else [(time.monotonic() - begin) / max(1, len(laws))]
+        rounds = [] if in_folder or not laws else [_further(course, laws)]
         for k in range(1, LOOKS[-1]):
             count = len(running)
             _expect(progress, k, count)
@@ -340,11 +339,20 @@ def _first_sets(
     return {entrant.law.name: entrant for entrant in entrants if entrant in ready}
 
 
-def _work(course: RaceCourse, entrant: SearchedEntrant) -> float:
-    """Return the work of a law's first search: coarse runs, and those of the sets that it decides
-    as a judgement does.
+def _further(course: RaceCourse, laws: Sequence[SearchedEntrant]) -> float:
+    """Return how long a further set of a law takes, s, on average, as the first runs and searches
+    tell. These took longer, as they compiled, too, or less long, where they were shorter.
     """
-    task = entrant.task_of(0)
+    clock = course.clock
+    searches = [clock.search_seconds(_work(course, entrant, 1)) for entrant in laws]
+    return sum(searches) / len(searches) + clock.pace * clock.unit * judgements([1])
+
+
+def _work(course: RaceCourse, entrant: SearchedEntrant, k: int = 0) -> float:
+    """Return the work of a law's search k: coarse runs, and those of the sets that it decides as a
+    judgement does.
+    """
+    task = entrant.task_of(k)
     coarse = 0.0
     for case in task.cases(0):
         coarse += case.samples * case.plant.n

@@ -5,6 +5,7 @@ for every mistake.
 import functools
 import itertools
 import json
+import math
 import os
 import re
 import signal
@@ -709,6 +710,16 @@ def test_a_film_of_an_answer_has_as_many_pictures_as_its_time_allows(tmp_path, m
     assert re.search(r"in place of a film, which would take \d+ s\b", said[1])
     with Image.open(said[0]) as picture:
         assert picture.size == (1280, 720)
+    with monkeypatch.context() as patch:  # pictures take longer than the first ones told
+
+        def write(frames, made, part):
+            patch.setattr(studies, "time", types.SimpleNamespace(monotonic=lambda: math.inf))
+            list(made)
+
+        patch.setitem(film.WRITERS, ".mp4", write)
+        studies._film(recommendation, tmp_path, time.monotonic() + 600.0, terminal)
+    assert "no time for a film" in said.pop()
+    assert [path.name for path in tmp_path.iterdir()] == ["worst.png"]
     studies._film(recommendation, tmp_path, time.monotonic() + 600.0, terminal)
     assert said[2:] == [tmp_path / "worst.mp4"]
     frame = next(ffmpeg.read_frames(str(said[2])))

@@ -64,7 +64,9 @@ def run(monkeypatch):
     nothing = types.SimpleNamespace(read=lambda: None, keep=lambda result: result, path=None)
     monkeypatch.setattr(module, "_file", lambda *piece: nothing)
     monkeypatch.setattr(module, "_judgement", lambda *piece: nothing)
-    monkeypatch.setattr(module, "_work", lambda course, entrant: 10.0 / entrant.share)
+    monkeypatch.setattr(
+        module, "_work", lambda course, entrant, k=0: 10.0 / (1 if k else entrant.share)
+    )
     monkeypatch.setattr(module, "writable", lambda *paths: None)
 
     def unseen(trial, plant, values, goal, numbers):
@@ -230,7 +232,7 @@ def test_the_bar_says_once_the_sets_are_timed_if_too_few_fit(
 def test_a_race_leaves_the_time_that_the_runs_after_it_take(run, now):
     """By the pace of its own judgements, which is known once a law was judged."""
     sets = []
-    for after in (0.0, 80.0, 110.0):
+    for after in (0.0, 80.0, 115.0):
         now[0] = 0.0
         clock = AnswerTime(160.0, after=after - 20.0, table=4.0, choice=6.0, unit=1.0)
         sets.append(run({"a": 0.0, "b": 2.0}, clock=clock).sets)
@@ -246,6 +248,8 @@ def test_every_law_gets_a_first_set_from_a_shorter_search_where_time_is_short(ru
     raced = run(laws, clock=clock)
     assert [*raced.entrants] == [*laws]
     assert raced.shorter
+    assert raced.sets == 1
+    assert raced.seconds == pytest.approx(8 * (10.0 + 1.0))  # of whole searches, each judged once
     assert {entrant.share for entrant in raced.entrants.values()} <= {1, 2, 4}
     assert now[0] <= 100.0
     assert not run(laws, clock=AnswerTime(now[0] + 1000.0)).shorter

@@ -160,8 +160,9 @@ def _film(
 ) -> None:
     """Film the worst run of the first law of a race until a time of `time.monotonic`, s, with as
     many pictures a second as can be made by then; if these are too few, write one picture. With
-    less than `least` left, s, or none after a first picture, write nothing.
+    less than `least` left, s, or where they take longer than the first ones told, write nothing.
     """
+    from smc_mujoco.analysis.tuning.quick_search import OutOfTime
     from smc_mujoco.draw.film import film as films
 
     late = "no time for a film; the same command with more --minutes makes it"
@@ -171,7 +172,7 @@ def _film(
 
     def on_time() -> None:
         if time.monotonic() > ends:
-            raise TimeoutError
+            raise OutOfTime
 
     run = [recommendation.worst_trace]
     title = _worst_title(recommendation)
@@ -190,7 +191,8 @@ def _film(
             frames = films.Frames(run, title=title, size=films.FULL_SIZE, fps=fps)
             fps = min(fps, fps * fit / len(frames))
         if fps >= MIN_FPS:
-            terminal.wrote(films.film(run, out / "worst.mp4", title=title, fps=fps))
+            frames = films.Frames(run, title=title, size=films.FULL_SIZE, fps=fps)
+            terminal.wrote(films.write_film(frames, out / "worst.mp4", on_time))
         elif time.monotonic() + first - begun > ends:  # a picture takes as long again
             terminal.note(late)
         else:
@@ -203,7 +205,7 @@ def _film(
                 "same command with more --minutes makes it.",
                 wrap=True,
             )
-    except TimeoutError:
+    except OutOfTime:
         terminal.note(late)
     except ScenarioError as error:  # the answer stands without it
         terminal.note(f"no film: {error}", wrap=True)

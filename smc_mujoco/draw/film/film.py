@@ -239,19 +239,24 @@ def film(
     return write_film(frames, Path(path))
 
 
-def write_film(frames: Frames, path: Path) -> Path:
-    """Write frames to a file, as its ending tells, and return its path."""
-    images = pictures(frames, ahead=True)
+def write_film(frames: Frames, path: Path, between: Callable[[], object] = bool) -> Path:
+    """Write frames to a file, as its ending tells, and return its path. `between` is called
+    between pictures, and may raise; then there is no file.
+    """
+    images = pictures(frames, ahead=True, between=between)
     clear_abandoned(path)
     with replacing(path) as part, contextlib.closing(images), bar("film", len(frames)) as progress:
-        WRITERS[path.suffix](frames, _counted(images, progress), part)
+        WRITERS[path.suffix](frames, _counted(images, progress, between), part)
     return path
 
 
-def _counted(made: Iterator[Array], progress: Bar) -> Iterator[Array]:
+def _counted(
+    made: Iterator[Array], progress: Bar, between: Callable[[], object]
+) -> Iterator[Array]:
     for picture in made:
         yield picture
         progress.advance(1)
+        between()
 
 
 def _write_mp4(frames: Frames, made: Iterator[Array], part: Path) -> None:
