@@ -192,6 +192,7 @@ def _film(
             fps = min(fps, fps * fit / len(frames))
         if fps >= MIN_FPS:
             frames = films.Frames(run, title=title, size=films.FULL_SIZE, fps=fps)
+            ends += least  # what is nearly made is not thrown away
             terminal.wrote(films.write_film(frames, out / "worst.mp4", on_time))
         elif time.monotonic() + first - begun > ends:  # a picture takes as long again
             terminal.note(late)
