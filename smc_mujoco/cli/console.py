@@ -11,7 +11,13 @@ from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 
-from smc_mujoco.common.attended import ENDED_BY_CTRL_C, STOPPED, raising, stop_at_once
+from smc_mujoco.common.attended import (
+    ENDED_BY_CTRL_C,
+    STOPPED,
+    ignore_ctrl_c,
+    raising,
+    stop_at_once,
+)
 from smc_mujoco.common.errors import ScenarioError, printable
 from smc_mujoco.common.files import to_json, with_ending, writable, write_json
 from smc_mujoco.common.interrupts import handling
@@ -35,6 +41,8 @@ def errors_as_sentences() -> Iterator[None]:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         raise SystemExit(1) from None
     except KeyboardInterrupt:
+        if signal.getsignal(signal.SIGINT) is stop_at_once:  # the process is the program's
+            ignore_ctrl_c()  # another one would interrupt its end
         _fail(STOPPED, ENDED_BY_CTRL_C)
     except Exception as error:
         if lines := users_traceback(error):

@@ -79,7 +79,7 @@ def _wait(threads: Iterable[threading.Thread]) -> None:
         alive[0].join(rest)
 
 
-def _ignore_ctrl_c() -> None:
+def ignore_ctrl_c() -> None:
     """Let a Ctrl-C from now on interrupt nothing. One that has come already may be raised here."""
     if threading.current_thread() is threading.main_thread():
         signal.signal(signal.SIGINT, signal.SIG_IGN)
@@ -124,7 +124,7 @@ def _end_with_python() -> None:
     is half gone. Python's last collections are left out: they take .5 s, which Ctrl-C would wait
     for.
     """
-    _ignore_ctrl_c()
+    ignore_ctrl_c()
     gc.freeze()
     for stop in list(_running.values()):
         stop()
@@ -143,4 +143,4 @@ def leave() -> NoReturn:
 
 
 # Called just before it: a Ctrl-C that is raised in there does not skip the end of the threads.
-atexit.register(_ignore_ctrl_c)
+atexit.register(ignore_ctrl_c)
