@@ -211,11 +211,15 @@ class Plant:
         """Return what a parameter may be."""
         if parameter in self.positive:
             low = TINY if parameter in self.above_zero else 1e-6
-        elif parameter in (*self.dry, *self.added) or "." in parameter:  # of a user's joint or body
+        elif self._is_natural(parameter):
             low = 0.0
         else:
             low = -MAX_PARAMETER
         return Number(low=low, high=MAX_PARAMETER)
+
+    def _is_natural(self, parameter: str) -> bool:
+        """Return whether a parameter is 0 or more, as the numbers of a user's joints and bodies."""
+        return parameter in (*self.dry, *self.added) or "." in parameter
 
     @property
     def driven(self) -> int:
@@ -372,7 +376,10 @@ class Plant:
             else:
                 values[name] = values[name] * factor
         for name, value in values.items():
-            if not self.constraint(name).low <= value <= MAX_PARAMETER:
+            too_low = (value <= 0.0 and name in self.positive) or (
+                value < 0.0 and self._is_natural(name)
+            )
+            if not abs(value) <= MAX_PARAMETER or too_low:
                 raise ScenarioError(
                     f"{self.name}'s true {name} becomes {value:g}: give other factors"
                 )
