@@ -1,12 +1,17 @@
-"""Help of commands: options in groups, and those that few users need only by --help-all."""
+"""Help of commands: commands and options in groups, and options that few users need only by
+--help-all.
 
-from collections.abc import Sequence
+It is plain text, as rich's takes half of the time in which a person waits for it.
+"""
+
+import inspect
+from collections.abc import Iterable, Iterator, Sequence
 from contextvars import ContextVar
 from itertools import pairwise
 from typing import Any
 
-from typer import BadParameter
-from typer.core import TyperCommand, TyperOption
+from typer import BadParameter, style
+from typer.core import TyperCommand, TyperGroup, TyperOption
 
 from smc_mujoco.answers import command
 from smc_mujoco.common.text import real
@@ -59,6 +64,42 @@ class GroupedCommand(TyperCommand):
                 option.rich_help_panel = GROUPS.get(option.opts[0], ASKED)
                 option.hidden = option.rich_help_panel == RARE and not _wants_all.get()
         return params
+
+    def format_options(self, ctx: Any, formatter: Any) -> None:
+        """Write the arguments, then each group of options."""
+        _write(formatter, _records(self, ctx))
+
+
+class GroupedProgram(TyperGroup):
+    """The program, whose help has groups of commands, each with its first sentences."""
+
+    def format_options(self, ctx: Any, formatter: Any) -> None:
+        """Write the groups of commands, then the options."""
+        commands = []
+        for name, listed in self.commands.items():
+            sentences, _, _ = inspect.cleandoc(listed.help or "").partition("\n\n")
+            commands.append((getattr(listed, "rich_help_panel", ""), name, sentences))
+        _write(formatter, commands)
+        _write(formatter, _records(self, ctx))
+
+
+def _records(of: TyperCommand | TyperGroup, ctx: Any) -> Iterator[tuple[str, str, str]]:
+    """Yield group, name and text of each argument and option that is shown."""
+    for param in of.get_params(ctx):
+        if record := param.get_help_record(ctx):
+            usual = "Options" if isinstance(param, TyperOption) else "Arguments"
+            yield (getattr(param, "rich_help_panel", None) or usual, *record)
+
+
+def _write(formatter: Any, rows: Iterable[tuple[str, str, str]]) -> None:
+    """Write rows (group, name, text) under the headings of their groups, in the same columns."""
+    groups: dict[str, list[tuple[str, str]]] = {}
+    for group, name, text in rows:
+        groups.setdefault(group, []).append((name, text))
+    width = max(len(name) for of_group in groups.values() for name, _ in of_group)
+    for group, of_group in groups.items():
+        with formatter.section(style(group, bold=True)):
+            formatter.write_dl([(name.ljust(width), text) for name, text in of_group])
 
 
 def _names(options: Sequence[TyperOption]) -> str:

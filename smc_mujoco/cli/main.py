@@ -22,7 +22,7 @@ from smc_mujoco.cli.commands import (
     studies,
 )
 from smc_mujoco.cli.console import errors_as_sentences
-from smc_mujoco.cli.help_pages import GroupedCommand, with_all
+from smc_mujoco.cli.help_pages import GroupedCommand, GroupedProgram, with_all
 from smc_mujoco.common import annexes
 from smc_mujoco.common.errors import ScenarioError, UnitWarning, printable
 from smc_mujoco.common.gl import choose_gl
@@ -32,7 +32,8 @@ app = typer.Typer(
     help="Simulate, compare and tune sliding-mode controllers on MuJoCo mechanisms.",
     no_args_is_help=True,
     pretty_exceptions_enable=False,
-    rich_markup_mode="markdown",
+    rich_markup_mode=None,
+    cls=GroupedProgram,
 )
 DRAWN = ("film", "figure", "plot", "video")  # commands that do not exist, and that users try
 # heading in the help -> commands; the annexes add theirs
