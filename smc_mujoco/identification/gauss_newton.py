@@ -30,7 +30,6 @@ MAX_STATE = 100.0
 KICKS = -4.0, 4.0
 # percent: fit of a piece beyond which it is not fitted from there; chosen
 GOOD_PIECE = 99.5
-MIN_SIZE = 1e-300  # in place of the size 0 of slopes
 MAX_FACTOR = 10.0  # by which a step may change a quantity that cannot be negative; chosen
 NEGLIGIBLE_VALUE = 1e-4  # of its scale: below it such a quantity may become 0; chosen
 # relative changes of the cost at which a search ends, if what it reaches is the solution, if more
@@ -165,10 +164,8 @@ def flanks(replays: Replays) -> list[Point]:
 
 def _left(slopes: Slopes, rows: list[Array]) -> float:
     """Return the sum of squares of residuals without what quantities can cause, by the slopes."""
-    J = slopes.freed_slopes
-    basis, _ = np.linalg.qr(J / np.maximum(np.linalg.norm(J, axis=0), MIN_SIZE))
     freed = np.concatenate(slopes.freed(rows))
-    return cost([freed - basis @ (basis.T @ freed)])
+    return cost([freed - slopes.basis @ (slopes.basis.T @ freed)])
 
 
 def _other_delay(
@@ -192,7 +189,7 @@ def _other_delay(
                 values[k] + move / replays.scales[k], replays.low[k], replays.high[k]
             )
             points.append(Point(values, best.states))
-        lefts = [_left(slopes, rows) for rows in replays.residuals(points)]
+        lefts = [_left(slopes, rows) for rows in replays.delayed(slopes, points)]
         if min(lefts) >= least:
             return None if best is slopes.point else best
         least = min(lefts)
@@ -368,7 +365,7 @@ def refine(
         serves = change < SMALL_CHANGE or (
             rough and gain > TRUE_PROMISE * _promise(replays, slopes)
         )
-        slopes = after if serves else replays.slopes(after.point, central=not rough)
+        slopes = after if serves else replays.slopes(after.point, not rough, after.residuals)
         if change < tolerance:
             break
     return slopes
@@ -450,7 +447,9 @@ def _own_starts(replays: Replays, point: Point, most: int) -> Slopes:
         falling = still
         if not falling:
             break
-        slopes = replays.only(falling).slopes(Point(point.values, states[falling]), central=False)
+        begun = Point(point.values, states[falling])
+        of_falling = [residuals[k] for k in falling]
+        slopes = replays.only(falling).slopes(begun, False, of_falling)
     return dataclasses.replace(first, point=Point(point.values, states), residuals=residuals)
 
 

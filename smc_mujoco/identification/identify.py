@@ -694,10 +694,10 @@ def _solved(
             if pieces.slope_steps:
                 (residuals,) = pieces.residuals([reached.point])
                 reached = dataclasses.replace(reached, residuals=residuals)
-                point = gauss_newton.refine(pieces, reached, most, tolerance, rough=True).point
+                reached = gauss_newton.refine(pieces, reached, most, tolerance, rough=True)
             else:
                 tolerance = gauss_newton.COST_TOLERANCE
-            reached = pieces.slopes(pieces.in_order(point))
+            reached = pieces.slopes(pieces.in_order(reached.point), residuals=reached.residuals)
             reached = gauss_newton.refine(pieces, reached, most, tolerance)
             return pieces, *gauss_newton.extrapolated(pieces, reached, most)
         pieces.slope_steps = {}

@@ -129,8 +129,7 @@ def _strongest(shares: Sequence[Explained]) -> int:
 
 def _shares(slopes: Slopes, lacks: Sequence[Lack]) -> list[Explained]:
     """Return what each lack alone explains beside the numbers of the slopes."""
-    J = slopes.freed_slopes
-    basis, _ = np.linalg.qr(J / np.maximum(np.linalg.norm(J, axis=0), 1e-300))
+    basis = slopes.basis
     r = slopes.freed_residuals
     residuals = r - basis @ (basis.T @ r)
     starts = _starts(slopes)

@@ -24,6 +24,7 @@ from smc_mujoco.mechanisms.hardware.beside_joint import BesideJoint
 from smc_mujoco.mechanisms.layout import driven_names
 
 SIZE = 0.01  # of the command's deviation: a force so small acts linearly; chosen
+ROUGH = "Euler"  # integrator of long steps: its errors cancel in what a small force changes
 NEAR_REST = 0.1, 0.3  # of the speed's rms: widths of a drop of friction with speed; chosen
 WAVES = 4  # half waves of a force over the range of positions; chosen
 SLOW_WAVES = 2  # of a friction over that range, and of a force over the time of a log; chosen
@@ -115,8 +116,12 @@ def lacking_forces(rig: LogRig, replays: Replays, slopes: Slopes) -> list[Lack]:
     the values of the slopes.
     """
     texts = []
+    trial = copy.copy(replays)
+    trial.corrections = None
+    longer = rig.long_steps(replays.pieces[0].part)  # pyright: ignore[reportArgumentType]
+    trial.steps = replays.steps | (longer and longer | {"integrator": ROUGH})
+    (predicted,) = trial.predicted([slopes.point])
     pieces = list(replays.pieces)
-    (predicted,) = replays.predicted([slopes.point])
     for i, joint in enumerate(driven_names(rig.plant)):
         geared = any(isinstance(part, BesideJoint) for part in rig.base.drive_train.chains[i])
         shapes_by_piece = []
@@ -126,11 +131,7 @@ def lacking_forces(rig: LogRig, replays: Replays, slopes: Slopes) -> list[Lack]:
             words = SPRUNG if geared and of_pieces[0][0] == COMMAND else of_pieces[0][0]
             texts.append(f"lack of fit: the model lacks a force on {joint} {words}")
             pieces += _slightly_pushed(replays.pieces, [force for _, force in of_pieces], i)
-    trial = copy.copy(replays)
     trial.pieces = pieces
-    trial.corrections = None
-    longer = rig.long_steps(pieces[0].part)  # pyright: ignore[reportArgumentType]
-    trial.steps = replays.steps | longer
     states = np.tile(slopes.point.states, (len(texts) + 1, 1))
     (rows,) = trial.residuals([Point(slopes.point.values, states)])
     count = len(replays.pieces)

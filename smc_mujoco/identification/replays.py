@@ -50,6 +50,7 @@ PARTS = 2.0, 4.0  # of a step, by which replays are extrapolated to steps of 0
 MAX_STEP = 2.5e-4  # s, of RK4 in corrected replays; chosen
 # of that step, for slopes: with dry friction they err by 5 % then, and by up to 45 % before; chosen
 SLOPE_HALVINGS = 2
+MIN_SIZE = 1e-300  # in place of the size 0 of slopes
 # largest residual of a sample, relative to the norm of the record; that of a run that fails
 WORST = 1.0
 # ratio of singular values below which states at the start have no effect of their own
@@ -118,6 +119,13 @@ class Slopes:
     def freed_slopes(self) -> Array:
         """The derivatives by the quantities, `freed`, of all pieces, (all N, p)."""
         return np.concatenate(self.freed(self.by_values))
+
+    @cached_property
+    def basis(self) -> Array:
+        """What quantities can cause beside states, as orthonormal columns, (all N, p)."""
+        J = self.freed_slopes
+        vectors, _ = np.linalg.qr(J / np.maximum(np.linalg.norm(J, axis=0), MIN_SIZE))
+        return vectors
 
     @cached_property
     def freed_residuals(self) -> Array:
@@ -319,6 +327,20 @@ class Replays:
             return residuals
         return [list(map(operator.add, rows, self.step_errors)) for rows in residuals]
 
+    def delayed(self, slopes: Slopes, points: Sequence[Point]) -> list[list[Array]]:
+        """Return `residuals` at points that differ from that of slopes in the delay, by what that
+        changes in replays with the steps of derivatives.
+        """
+        if not self.slope_steps or self.slope_steps == self.steps:
+            return self.residuals(points)
+        with self._stepping(self.slope_steps):
+            before, *after = self._residuals([slopes.point, *points])
+        delayed = []
+        for rows in after:
+            changes = map(operator.sub, rows, before)
+            delayed.append(list(map(operator.add, slopes.residuals, changes)))
+        return delayed
+
     def by_steps(self, points: Sequence[Point], parts: Sequence[float]) -> list[list[list[Array]]]:
         """Return `residuals` with each of some parts of the physics step, and commands as fine."""
         plain = self.rig(points[0]).repeated(self._part(0))
@@ -464,9 +486,12 @@ class Replays:
         rows = np.nan_to_num(np.column_stack(columns), nan=WORST, posinf=WORST, neginf=-WORST)
         return np.clip(rows, -WORST, WORST).ravel()
 
-    def slopes(self, point: Point, central: bool = True) -> Slopes:
+    def slopes(
+        self, point: Point, central: bool = True, residuals: list[Array] | None = None
+    ) -> Slopes:
         """Return residuals and their derivatives at a point, by differences that stay within the
-        ranges: central ones, or in half the time those to one side.
+        ranges: central ones, or in half the time those to one side. `residuals`: those at the
+        point, if they are there already.
         """
         p = len(self.names)
         steps = np.full(p, DIFFERENCE_STEP)
@@ -479,8 +504,9 @@ class Replays:
         points = [point, *ahead, *behind]
         with self._stepping(self.slope_steps or self.steps) as steps:
             before, *rows = self.residuals(points)
-        residuals = before
-        if steps != self.steps:
+        if steps == self.steps:
+            residuals = before
+        elif residuals is None:
             (residuals,) = self.residuals([point])
         count = len(ahead)
         rows_behind = rows[count:]

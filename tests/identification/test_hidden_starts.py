@@ -209,7 +209,7 @@ def test_another_stiffness_is_tried_with_damping_as_an_undamped_spring_rings():
     slopes = SimpleNamespace(
         point=present,
         residuals=residuals([present])[0],
-        freed_slopes=np.eye(4)[:, :2],
+        basis=np.eye(4)[:, :2],
         freed=lambda rows: rows,
     )
     spring = gauss_newton._other_spring(replays, slopes)  # pyright: ignore[reportArgumentType]

@@ -294,6 +294,32 @@ def test_a_delay_is_found_from_samples_away_although_its_slopes_say_little(late)
     assert gauss_newton._other_delay(curve, reached, 0.01) is None
 
 
+def test_what_another_delay_changes_is_of_longer_steps_whose_errors_cancel():
+    curve = Curve()
+    slopes = curve.slopes(curve.start)
+    points = [
+        Point(curve.start.values + np.array([0.0, move]), curve.start.states) for move in (0.1, 0.2)
+    ]
+    exact = curve.residuals(points)
+    curve.slope_steps, curve.lag = {"physics_step": 1e-3}, 50.0
+    curve.replayed.clear()
+    for rows, expected in zip(curve.delayed(slopes, points), exact, strict=True):
+        for row, right in zip(rows, expected, strict=True):
+            np.testing.assert_allclose(row, right, atol=1e-12)
+    assert curve.replayed == [{"physics_step": 1e-3}]
+    assert not curve.steps
+
+
+def test_residuals_that_are_there_are_not_replayed_again_for_slopes():
+    curve = Curve()
+    curve.slope_steps = {"physics_step": 1e-3}
+    exact = curve.residuals([curve.start])[0]
+    curve.replayed.clear()
+    slopes = curve.slopes(curve.start, residuals=exact)
+    assert slopes.residuals is exact
+    assert curve.replayed == [{"physics_step": 1e-3}]
+
+
 def test_the_last_delay_is_the_one_that_fits_and_its_error_has_the_move():
     curve = Jumpy((2.0, 2.4))
     first = curve.slopes(curve.start)
