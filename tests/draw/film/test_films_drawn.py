@@ -370,7 +370,7 @@ def test_arguments_reach_a_film_s_frames_and_its_file(monkeypatch, tmp_path):
     wrote = []
     reported = []
 
-    def blank(frames, ahead=False):
+    def blank(frames, ahead=False, between=bool):
         times = frames.clock.times
         calls.append(
             (
