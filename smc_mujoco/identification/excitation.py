@@ -33,7 +33,7 @@ from smc_mujoco.control.from_text import law as find_law
 from smc_mujoco.control.law import Law
 from smc_mujoco.identification import gauss_newton, inverse_dynamics
 from smc_mujoco.identification.lack_of_fit import lack_of_fit
-from smc_mujoco.identification.log_rig import LogPart
+from smc_mujoco.identification.log_rig import LONG_STEP, LogPart
 from smc_mujoco.identification.own_rig import OwnRig, own_rig
 from smc_mujoco.identification.paths import DELAY, named_once
 from smc_mujoco.identification.presliding import presliding
@@ -68,7 +68,6 @@ OF_FORCE = 0.7  # of the bound on u, that the motion itself may take; chosen
 # s, longest physics step of the runs; chosen: with 0.25 ms dry friction creeps so much that logs of
 # them show it by 7.6 deviations
 PLAYED_STEP = 1e-4
-SLOPE_STEP = 2e-3  # s, longest physics step for slopes: errors need no more; chosen
 INTEGRATOR = "implicitfast"  # of friction that gives way: errors need no more; chosen
 # Typical numbers where the model has 0: of the bound on u, of a joint's inertia, s; chosen
 FRICTION_SHARE, ARMATURE_SHARE, TYPICAL_DELAY = 0.03, 0.2, 0.004
@@ -566,14 +565,11 @@ def _told(rig: OwnRig, names: list[str], trace: Trace) -> dict[str, Any]:
 
 
 def _slopes(replays: Replays, point: Point) -> Slopes:
-    """Return slopes at a point, by replays with long steps, each under one command."""
+    """Return slopes at a point, by replays with long steps."""
     trial = copy.copy(replays)
-    trial.pieces = []
-    for piece in replays.pieces:
-        assert isinstance(piece.part, LogPart)
-        part = piece.part.held(SLOPE_STEP)
-        trial.pieces.append(dataclasses.replace(piece, part=part))
-        trial.steps = {"physics_step": part.period}
+    part = replays.pieces[0].part
+    assert isinstance(part, LogPart)
+    trial.steps = {"physics_step": part.held(LONG_STEP).period}
     return trial.slopes(point, central=False)
 
 

@@ -273,13 +273,13 @@ def _left_by_steps(
 
 def _settled(replays: Replays, slopes: Slopes, most: int) -> Slopes:
     """Return what at most `most` steps with the derivatives of slopes reach, until one gains
-    little.
+    little, or the next promises little.
     """
     for _ in range(most):
         after = _best_step(replays, slopes, rough=True)
         enough = after.cost >= (1.0 - LAST_CHANGE) * slopes.cost
         slopes = min(after, slopes, key=lambda slopes: slopes.cost)
-        if enough:
+        if enough or _promise(replays, slopes) < LAST_CHANGE * slopes.cost:
             break
     return slopes
 
@@ -350,7 +350,7 @@ def refine(
     rough: bool = False,
 ) -> Slopes:
     """Return the slopes at the least squares near others, after at most `most` steps that lower the
-    cost, until one lowers it by less than the share `tolerance`.
+    cost, until one lowers it by less than the share `tolerance`, or the next promises less.
 
     Derivatives of the last steps, which change little, are those of the step before. If `rough`,
     derivatives are differences to one side, and serve while they keep their promise; else all
@@ -366,7 +366,7 @@ def refine(
             rough and gain > TRUE_PROMISE * _promise(replays, slopes)
         )
         slopes = after if serves else replays.slopes(after.point, not rough, after.residuals)
-        if change < tolerance:
+        if change < tolerance or _promise(replays, slopes) < tolerance * slopes.cost:
             break
     return slopes
 
@@ -397,15 +397,25 @@ def fit_starts(replays: Replays, most: int) -> Slopes:
 
 def starting_states(repeats: Replays, starts: Sequence[Point]) -> list[Array | None]:
     """Return the state from which each record is best repeated as a whole in an open loop, (q +
-    2n,): that of one of some starts, or what a step from it gives.
+    2n,): the best of some starts, or what a step from it gives.
     """
-    costs, moved = [], []
-    for start in starts:
-        slopes = repeats.slopes(start, central=False)
-        costs.append([cost([rows]) for rows in slopes.residuals])
-        moved.append(Point(start.values, start.states + slopes.moves(start.values)))
-    best = np.array([*costs, *repeats.costs(moved)]).argmin(axis=0)
-    return [repeats.state([*starts, *moved][k], i) for i, k in enumerate(best.tolist())]
+    tried = repeats.residuals(starts)
+    costs = []
+    for rows in tried:
+        costs.append([cost([row]) for row in rows])
+    best = np.argmin(costs, axis=0).tolist()
+    before = []
+    states = []
+    for i, k in enumerate(best):
+        before.append(tried[k][i])
+        states.append(starts[k].states[i])
+    begun = Point(starts[0].values, np.array(states))
+    slopes = repeats.slopes(begun, False, before)
+    moved = Point(begun.values, begun.states + slopes.moves(begun.values))
+    reached = []
+    for i, after in enumerate(repeats.costs([moved])[0].tolist()):
+        reached.append(repeats.state(moved if after < cost([before[i]]) else begun, i))
+    return reached
 
 
 def _fitted_from(
@@ -436,13 +446,15 @@ def _own_starts(replays: Replays, point: Point, most: int) -> Slopes:
     falling = list(range(len(residuals)))
     for _ in range(most):
         after = _best_step(replays.only(falling), slopes, rough=True)
+        promised = after.freed(after.residuals)
         still = []
         for i, k in enumerate(falling):
             before, reached = cost([residuals[k]]), cost([after.residuals[i]])
             if reached < before:
                 residuals[k] = after.residuals[i]
                 states[k] = after.point.states[i]
-            if reached < (1.0 - SMALL_CHANGE) * before:
+            falls = reached < (1.0 - SMALL_CHANGE) * before
+            if falls and cost([promised[i]]) < (1.0 - SMALL_CHANGE) * reached:
                 still.append(k)
         falling = still
         if not falling:

@@ -24,7 +24,6 @@ from smc_mujoco.mechanisms.hardware.beside_joint import BesideJoint
 from smc_mujoco.mechanisms.layout import driven_names
 
 SIZE = 0.01  # of the command's deviation: a force so small acts linearly; chosen
-ROUGH = "Euler"  # integrator of long steps: its errors cancel in what a small force changes
 NEAR_REST = 0.1, 0.3  # of the speed's rms: widths of a drop of friction with speed; chosen
 WAVES = 4  # half waves of a force over the range of positions; chosen
 SLOW_WAVES = 2  # of a friction over that range, and of a force over the time of a log; chosen
@@ -118,8 +117,7 @@ def lacking_forces(rig: LogRig, replays: Replays, slopes: Slopes) -> list[Lack]:
     texts = []
     trial = copy.copy(replays)
     trial.corrections = None
-    longer = rig.long_steps(replays.pieces[0].part)  # pyright: ignore[reportArgumentType]
-    trial.steps = replays.steps | (longer and longer | {"integrator": ROUGH})
+    trial.steps = replays.steps | replays.rough_steps
     (predicted,) = trial.predicted([slopes.point])
     pieces = list(replays.pieces)
     for i, joint in enumerate(driven_names(rig.plant)):

@@ -45,6 +45,7 @@ from smc_mujoco.simulation.time_series import TimeSeries
 from smc_mujoco.simulation.trace import Trace
 
 MAX_PERIOD = 1e-3  # s, of a replay's commands; chosen: a mixed command then errs by 0.5 us^2 u/J
+LONG_STEP = 2e-3  # s, longest physics step of trials and of derivatives; chosen
 SLOWEST = 40.0  # Hz: a log of fewer samples a second misses too much of the commands; chosen
 STILL = 3.0  # deviations of the noise, or steps of the sensor: less is no motion; chosen
 RUN_STEP = 2.5e-4  # s, longest physics step of runs with a delay, which it divides
@@ -231,18 +232,22 @@ class LogRig(Rig):
         return self.of_motors("gain", 1.0) * u + self.of_motors("offset", 0.0)
 
     def long_steps(self, part: RecordPart) -> Fields:
-        """Return the control period as the physics step of trials, if dry friction alone asks for
-        shorter ones: it changes its direction a little late then.
+        """Return the physics step of trials, which each command lasts, too, if dry friction alone
+        asks for shorter ones: it changes its direction a little late then.
         """
+        assert isinstance(part, LogPart)
         plain = self.repeated(part)
-        step = plain.control_period
         if plain.exact_friction or plain.actuator or plain.contact:
             return {}
-        resolves_poles = step * integration.fastest_pole(plain) <= integration.MAX_POLE
-        resolves_stops = step * constraint_rate(self.plant) <= integration.MAX_CONSTRAINT_RATE
-        if plain.resolved.integrator != "RK4" or not (resolves_poles and resolves_stops):
+        if plain.resolved.integrator != "RK4":
             return {}
-        return {"physics_step": step}
+        pole, rate = integration.fastest_pole(plain), constraint_rate(self.plant)
+        for longest in (LONG_STEP, part.period):
+            step = part.held(longest).period
+            resolves_stops = step * rate <= integration.MAX_CONSTRAINT_RATE
+            if step * pole <= integration.MAX_POLE and resolves_stops:
+                return {"physics_step": step}
+        return {}
 
     def finer(self, part: RecordPart, times: int) -> RecordPart:
         """Return a part with that many times as many commands, if a delay may be between them: it
@@ -336,8 +341,12 @@ class LogRig(Rig):
     def repeated(
         self, part: RecordPart, rounded: bool = False, state: Array | None = None, **changes: Any
     ) -> Scenario:
-        """Return the scenario that repeats a part of a log; see `Rig.repeated`."""
+        """Return the scenario that repeats a part of a log; see `Rig.repeated`. A physics step that
+        is longer than a command's period makes that as long.
+        """
         assert isinstance(part, LogPart)
+        if changes.get("physics_step", 0.0) > part.period:
+            part = part.held(changes["physics_step"])
         fields = self.numbers_of(Values(**self.values))
         # the machine has had these commands, whatever its limits are
         fields["plant"] = dataclasses.replace(fields["plant"], limits=(), reach=None)

@@ -38,7 +38,7 @@ from smc_mujoco.identification.least_squares import least_squares
 from smc_mujoco.identification.records import Record
 from smc_mujoco.identification.rig import Quantity, RecordPart, Rig
 from smc_mujoco.simulation import run_key
-from smc_mujoco.simulation.run import run
+from smc_mujoco.simulation.run import run_unjudged
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
 
@@ -50,6 +50,7 @@ PARTS = 2.0, 4.0  # of a step, by which replays are extrapolated to steps of 0
 MAX_STEP = 2.5e-4  # s, of RK4 in corrected replays; chosen
 # of that step, for slopes: with dry friction they err by 5 % then, and by up to 45 % before; chosen
 SLOPE_HALVINGS = 2
+ROUGH = "Euler"  # integrator of rough replays; chosen
 MIN_SIZE = 1e-300  # in place of the size 0 of slopes
 # largest residual of a sample, relative to the norm of the record; that of a run that fails
 WORST = 1.0
@@ -67,11 +68,6 @@ class Piece:
     measured: Record  # the columns compared, (N,) each
     spread: Numbers  # norm of each whole column about its mean: the unit of residuals
     scales: Array  # units of the free states, (s,)
-
-    @property
-    def stride(self) -> int:
-        """Control periods of its replay for each of its samples."""
-        return self.part.stride if self.part else 1
 
 
 @frozen_data
@@ -232,6 +228,8 @@ class Replays:
             self.pieces += self._pieces(i)
         # those of derivatives, which may be longer; none: those of residuals
         self.slope_steps: Fields = {} if closed else twin.long_steps(self._part(0))
+        # those of which only what changes counts, as their errors cancel; none: those of residuals
+        self.rough_steps: Fields = self.slope_steps and self.slope_steps | {"integrator": ROUGH}
 
     @property
     def start(self) -> Point:
@@ -329,11 +327,11 @@ class Replays:
 
     def delayed(self, slopes: Slopes, points: Sequence[Point]) -> list[list[Array]]:
         """Return `residuals` at points that differ from that of slopes in the delay, by what that
-        changes in replays with the steps of derivatives.
+        changes in rough replays.
         """
-        if not self.slope_steps or self.slope_steps == self.steps:
+        if not self.rough_steps:
             return self.residuals(points)
-        with self._stepping(self.slope_steps):
+        with self._stepping(self.rough_steps):
             before, *after = self._residuals([slopes.point, *points])
         delayed = []
         for rows in after:
@@ -445,7 +443,7 @@ class Replays:
         first = self.twin.repeated(self._part(0), state=self.state(points[0], 0), **fields)
         yield run_key.run_key(first).encode()
         for k, piece in enumerate(self.pieces):
-            yield repr((piece.record, piece.skipped, piece.stride, [*piece.measured])).encode()
+            yield repr((piece.record, piece.skipped, [*piece.measured])).encode()
             for values in piece.measured.values():
                 yield values.tobytes()
             for point in points:
@@ -463,7 +461,7 @@ class Replays:
                 for k in range(len(self.pieces)):
                     state = self.state(point, k)
                     scenarios.append(rig.repeated(self._part(k), state=state, **fields))
-            traces = iter(run(scenarios))
+            traces = iter(run_unjudged(scenarios))
         return [self.by_piece(rig, traces) for rig in rigs]
 
     def by_piece(self, rig: Rig, traces: Iterator[Trace]) -> list[Record]:
@@ -471,8 +469,9 @@ class Replays:
         predictions = []
         for piece, trace in zip(self.pieces, traces, strict=False):
             columns = rig.predicted(trace)
-            for name in columns:
-                columns[name] = columns[name][:: piece.stride][piece.skipped :]
+            for name, values in columns.items():
+                samples = piece.skipped + len(piece.measured[name])
+                columns[name] = values[:: len(values) // samples][piece.skipped :]
             predictions.append(columns)
         return predictions
 

@@ -18,6 +18,7 @@ from smc_mujoco.identification.first_guess import first_guess
 from smc_mujoco.identification.friction_figure import curve_error, friction, measured_friction
 from smc_mujoco.identification.identify import SLOW
 from smc_mujoco.identification.own_rig import own_rig
+from smc_mujoco.identification.replays import Replays
 from smc_mujoco.mechanisms.custom.model_numbers import KINDS
 from smc_mujoco.mechanisms.hardware.servos import ServoFriction
 from smc_mujoco.simulation.conditions import from_file
@@ -375,6 +376,24 @@ def pid_log(imax, first):
     for name in log:
         log[name] = log[name][t >= first]
     return xml, truth, log
+
+
+@pytest.mark.parametrize(("rate", "longest"), [(1000.0, 1e-3), (250.0, 2e-3)])
+def test_trials_of_a_slow_log_hold_a_command_for_a_long_step(rate, longest):
+    """They have a row for each of the log, and hardly differ from replays with short steps."""
+    truth = {"j1.damping": 0.25, "j1.frictionloss": 0.5, "j2.damping": 0.08, "input_delay": 0.006}
+    t = np.arange(round(rate)) / rate
+    moving = {"x_j1": 0.3 * np.sin(6.0 * t), "x_j2": 0.3 * np.cos(5.0 * t)}
+    pushed = {"u_j1": 5.0 * np.sin(7.0 * t), "u_j2": np.cos(9.0 * t)}
+    rig = own_rig(smc.plant_from(TWO, ["j1", "j2"]), list(truth)).with_values(truth)
+    replays = Replays(rig, list(truth), [{"t": t} | moving | pushed], False)
+    assert replays.slope_steps == {"physics_step": pytest.approx(longest)}
+    (short,) = replays.predicted([replays.start])
+    replays.steps = replays.slope_steps
+    (long,) = replays.predicted([replays.start])
+    for name, values in short[0].items():
+        assert long[0][name].shape == values.shape == (len(t),)
+        np.testing.assert_allclose(long[0][name], values, atol=2e-3 * np.ptp(values))
 
 
 def test_a_piece_of_a_pid_s_log_begins_with_what_its_servo_has_integrated():
