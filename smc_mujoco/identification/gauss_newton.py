@@ -49,6 +49,7 @@ LEAST_DELAY_MOVE = 2.5e-4  # s, at the solution; chosen
 BETTER = 3.0  # deviations of noise, by which another delay must fit better there; chosen
 MOST_DELAYS = 3  # other delays, at most, from which a search starts again; chosen
 MOST_SLOPES = 3  # how often slopes are taken near the solution, at most; chosen
+LEAST_COST = 1e-300  # in place of the cost 0
 ROUGH_STEPS = 8  # steps from each start before the best is chosen; chosen
 CORRECTED_STEPS = 3  # steps after the first halving of the physics step; chosen
 MAX_HALVINGS = 5  # of the physics step in corrected replays; chosen
@@ -241,7 +242,7 @@ def extrapolated(replays: Replays, slopes: Slopes, most: int = 0) -> tuple[Slope
     replays.step_errors = list(map(operator.sub, ends.residuals, slopes.residuals))
     for _ in range(MOST_SLOPES):
         ends = _settled(replays, ends, most)
-        if _solved(replays, ends).cost >= (1.0 - LAST_CHANGE) * ends.cost:
+        if _share_of_numbers(replays, ends) < LAST_CHANGE:
             break
         ends = replays.slopes(ends.point)  # longer steps err by too much
     share = BETTER**2 / sum(map(len, ends.residuals))
@@ -273,13 +274,13 @@ def _left_by_steps(
 
 def _settled(replays: Replays, slopes: Slopes, most: int) -> Slopes:
     """Return what at most `most` steps with the derivatives of slopes reach, until one gains
-    little, or the next promises little.
+    little, or the numbers promise little.
     """
     for _ in range(most):
         after = _best_step(replays, slopes, rough=True)
         enough = after.cost >= (1.0 - LAST_CHANGE) * slopes.cost
         slopes = min(after, slopes, key=lambda slopes: slopes.cost)
-        if enough or _promise(replays, slopes) < LAST_CHANGE * slopes.cost:
+        if enough or _share_of_numbers(replays, slopes) < LAST_CHANGE:
             break
     return slopes
 
@@ -350,7 +351,7 @@ def refine(
     rough: bool = False,
 ) -> Slopes:
     """Return the slopes at the least squares near others, after at most `most` steps that lower the
-    cost, until one lowers it by less than the share `tolerance`, or the next promises less.
+    cost, until one lowers it by less than the share `tolerance`, or the numbers promise less.
 
     Derivatives of the last steps, which change little, are those of the step before. If `rough`,
     derivatives are differences to one side, and serve while they keep their promise; else all
@@ -366,7 +367,7 @@ def refine(
             rough and gain > TRUE_PROMISE * _promise(replays, slopes)
         )
         slopes = after if serves else replays.slopes(after.point, not rough, after.residuals)
-        if change < tolerance or _promise(replays, slopes) < tolerance * slopes.cost:
+        if change < tolerance or _share_of_numbers(replays, slopes) < tolerance:
             break
     return slopes
 
@@ -482,6 +483,13 @@ def _promise(replays: Replays, slopes: Slopes, damping: float = 0.0) -> float:
     """Return by how much a damped step lowers the cost, by the derivatives."""
     step = _moved(replays, slopes, damping) - slopes.point.values
     return slopes.cost - cost([slopes.freed_residuals + slopes.freed_slopes @ step])
+
+
+def _share_of_numbers(replays: Replays, slopes: Slopes) -> float:
+    """Return by which share of it the numbers promise to lower the cost that states cannot."""
+    step = _moved(replays, slopes, 0.0) - slopes.point.values
+    r = slopes.freed_residuals
+    return 1.0 - cost([r + slopes.freed_slopes @ step]) / max(cost([r]), LEAST_COST)
 
 
 def _chosen(replays: Replays, slopes: Slopes, values: Array, rough: bool) -> Slopes:

@@ -318,6 +318,16 @@ def test_a_step_that_promises_less_than_the_search_asks_is_not_replayed():
     assert len(curve.replayed) == 1
 
 
+def test_starts_of_pieces_that_are_off_do_not_keep_a_search_of_numbers_going():
+    """They promise most of the cost, and a piece whose start is stuck does so step after step."""
+    curve = Curve(noise=0.05)
+    solved = gauss_newton.refine(curve, curve.slopes(curve.start), 5).point
+    slopes = curve.slopes(Point(solved.values, solved.states + 1.0))
+    assert gauss_newton._promise(curve, slopes) > 0.9 * slopes.cost
+    assert gauss_newton._share_of_numbers(curve, slopes) < 1e-6
+    assert gauss_newton._share_of_numbers(curve, curve.slopes(curve.start)) > 0.9
+
+
 def test_residuals_that_are_there_are_not_replayed_again_for_slopes():
     curve = Curve()
     curve.slope_steps = {"physics_step": 1e-3}
