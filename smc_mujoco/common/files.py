@@ -250,8 +250,21 @@ def to_json(data: Any, indent: int | None = None, sort_keys: bool = False) -> st
 
 
 def from_json(text: str) -> Any:
-    """Return the data in a JSON text, with numbers in place of the words of `plain`."""
-    return _restored(json.loads(text))
+    """Return the data in a JSON text, with numbers in place of the words of `plain`.
+
+    Raises:
+      ValueError: it is no JSON, or an object has a name twice.
+    """
+    return _restored(json.loads(text, object_pairs_hook=_object))
+
+
+def _object(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    data = dict(pairs)
+    if len(data) < len(pairs):
+        names = [name for name, _ in pairs]
+        twice = next(name for name in names if names.count(name) > 1)
+        raise ValueError(f"{shown(twice)} stands in it twice")
+    return data
 
 
 def write_json(path: Path, data: Any, indent: int | None = 1) -> Path:

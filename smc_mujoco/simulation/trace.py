@@ -20,7 +20,9 @@ from smc_mujoco.common.errors import (
     ScenarioWarning,
     find,
     one_line,
+    printable,
     users_stacklevel,
+    warn_once,
     words,
 )
 from smc_mujoco.common.extras import package
@@ -518,10 +520,16 @@ def load(path: AnyPath) -> Trace:
             if f"{name}.npy" in members:
                 names.append(name)
         arrays = {name: _checked_array(archive, name, scenario) for name in names}
-        if "seal.npy" in members:  # those of older versions have none
+        sealed = "seal.npy" in members  # those of older versions have none
+        if sealed:
             content = {"about": _checked_array(archive, "about")} | arrays
             if str(_checked_array(archive, "seal")) != _seal(content):
                 raise ScenarioError(CHANGED)
+    if not sealed:
+        warn_once(
+            f"{printable(str(path))} has no seal, so nothing shows whether its numbers are those of "
+            "the run: run its scenario again, smc.run(trace.scenario)"
+        )
     return Trace(**arrays, scenario=scenario, **end)
 
 

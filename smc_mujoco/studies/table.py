@@ -39,6 +39,7 @@ from smc_mujoco.common.errors import (
     printable,
     shown,
     warn_once,
+    words,
 )
 from smc_mujoco.common.extras import package
 from smc_mujoco.common.files import (
@@ -186,6 +187,17 @@ def read_table(path: Path, sealed: bool = False) -> "pa.Table":
     return rows.replace_schema_metadata(metadata)
 
 
+def _with_types(rows: "pa.Table") -> "pa.Table":
+    """Return rows with the types of `schema`, such as numbers that another program wrote as text."""
+    expected = schema({})
+    for i, name in enumerate(rows.column_names):
+        if rows.column_names.count(name) > 1:
+            raise ScenarioError(f"it has column {name!r} twice")
+        if name in expected.names and rows.schema.types[i] != (field := expected.field(name)).type:
+            rows = rows.set_column(i, field, rows.column(i).cast(field.type))
+    return rows
+
+
 @dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
 class Table:
     """Runs and their scores.
@@ -213,6 +225,7 @@ class Table:
             for name in (*RUN_COLUMNS, *RESULT_COLUMNS):
                 if name not in data.column_names:
                     raise ScenarioError(f"it has no column {name!r}")
+            data = _with_types(data)
         return cls(data=data)
 
     def __len__(self) -> int:
@@ -324,14 +337,21 @@ class Table:
         row = self.data.slice(int(i) % len(self), 1)
         if scenario := self.scenarios_by_key.get(row["hash"][0].as_py()):
             return scenario
-        about = from_json(row["scenario"][0].as_py())
-        if "source" in row.column_names:
-            search = row["search"][0].as_py()
+        search = row["search"][0].as_py()
+        try:
+            about = from_json(row["scenario"][0].as_py())
             about["source"] = {
                 "kind": row["source"][0].as_py(),
                 "search": search and from_json(search),
             }
-        return scenario_json.restore(about)
+            return scenario_json.restore(about)
+        except ScenarioError:  # with its cure
+            raise
+        except Exception as error:
+            raise ScenarioError(
+                f"row {i} of the table holds no scenario ({words(error)}): read the file that the "
+                "study wrote"
+            ) from None
 
     def trace(self, i: int) -> Trace:
         """Run row i again and return its trace.

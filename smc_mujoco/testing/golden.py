@@ -74,6 +74,11 @@ def compare_with_record(file: Path, key: str, response: StepResponse, tolerances
     for name in names:
         value, unit = response.value(name)
         golden: Any = recorded[name]["value"]
+        if (of_file := recorded[name].get("unit")) != unit:
+            raise ScenarioError(
+                f"{file.name}, {key}: {name} is recorded in {shown(of_file)} and "
+                f"measured in {shown(unit)}: {UPDATE}"
+            )
         tolerance = tolerances.get(name, recorded[name]["tolerance"])
         alike = value == golden or (math.isnan(value) and math.isnan(golden))
         within = alike or abs(value - golden) <= tolerance
@@ -103,7 +108,8 @@ def read_golden(file: Path) -> dict[str, dict[str, Fields]]:
         stored = read_json(file)
         for entry in stored.values():
             for golden in entry.values():
-                golden.update(value=float(golden["value"]), tolerance=float(golden["tolerance"]))
+                tolerance = number("a tolerance in it", golden["tolerance"], low=0.0)
+                golden.update(value=float(golden["value"]), tolerance=tolerance)
         return stored
     except FileNotFoundError:
         return {}

@@ -160,6 +160,30 @@ def test_a_digest_of_other_rows_is_refused_and_a_copy_of_some_rows_is_a_table(tm
         assert Table.read(path).rows() == table.rows()[1:]
 
 
+@pytest.mark.filterwarnings("ignore:another program wrote")
+def test_columns_of_another_program_are_converted_or_refused(tmp_path):
+    table = study(small(), tmp_path / "study")
+    names = table.data.column_names
+
+    def read(name, *columns):
+        path = tmp_path / "other.parquet"
+        changed = table.data.remove_column(names.index(name))
+        for column in columns:
+            changed = changed.append_column(name, pa.array(column))
+        pq.write_table(changed, path)
+        return Table.read(path)
+
+    seeds = table.column("seed").tolist()
+    assert read("seed", list(map(str, seeds))).column("seed").tolist() == seeds
+    with pytest.raises(smc.ScenarioError, match="not a table"):
+        read("itae", ["a"] * len(table))
+    with pytest.raises(smc.ScenarioError, match="column 'itae' twice"):
+        read("itae", [1.0] * len(table), [2.0] * len(table))
+    for text in ["{", "[]", None]:
+        with pytest.raises(smc.ScenarioError, match="row 0 of the table holds no scenario"):
+            read("scenario", [text, *[""] * (len(table) - 1)]).scenario(0)
+
+
 def test_null_and_nan_are_not_the_same_content():
     columns = ([1.0, None], [1.0, math.nan], [None, 1.0])
     assert len({content(pa.table({"x": pa.array(column)})) for column in columns}) == 3

@@ -324,7 +324,10 @@ def test_a_golden_file_is_plain_and_holds_each_call(session, pytester):
 
 
 def test_a_broken_golden_file_is_one_sentence(tmp_path, refused):
-    for text in ["{", "[]", '{"test": 3}']:
+    metric = '{{"test": {{"overshoot": {{"value": 1, {} "unit": "%"}}}}}}'
+    tolerances = ['"tolerance": Infinity,', '"tolerance": NaN,', '"tolerance": -1,']
+    twice = '"tolerance": 1, "value": 2,'
+    for text in ["{", "[]", '{"test": 3}', *map(metric.format, [*tolerances, twice])]:
         (tmp_path / "a.json").write_text(text)
         refused(lambda: golden.read_golden(tmp_path / "a.json"), "a.json", "--smc-update")
 
@@ -359,6 +362,14 @@ def test_a_golden_metric_is_within_its_tolerance_or_off(
         said = None
     with said or contextlib.nullcontext():
         golden.compare_with_record(file, "test", response, of_test)
+
+
+def test_a_golden_metric_in_another_unit_is_refused(step_response, tmp_path, refused):
+    response = step_response("duffing", "none", step=0.1, duration=0.01)
+    file = tmp_path / "a.json"
+    golden.record(file, "test", response, {"peak": 1.0})
+    file.write_text(file.read_text().replace('"unit": "m"', '"unit": "mm"'))
+    refused(lambda: golden.compare_with_record(file, "test", response, {}), "'mm'", "--smc-update")
 
 
 def test_a_value_of_0_is_recorded_with_a_tolerance_above_rounding(step_response, tmp_path):
