@@ -527,8 +527,8 @@ def load(path: AnyPath) -> Trace:
                 raise ScenarioError(CHANGED)
     if not sealed:
         warn_once(
-            f"{printable(str(path))} has no seal, so nothing shows whether its numbers are those of "
-            "the run: run its scenario again, smc.run(trace.scenario)"
+            f"{printable(str(path))} has no seal, so nothing shows whether its numbers are those "
+            "of the run: run its scenario again, smc.run(trace.scenario)"
         )
     return Trace(**arrays, scenario=scenario, **end)
 

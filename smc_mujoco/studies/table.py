@@ -188,7 +188,7 @@ def read_table(path: Path, sealed: bool = False) -> "pa.Table":
 
 
 def _with_types(rows: "pa.Table") -> "pa.Table":
-    """Return rows with the types of `schema`, such as numbers that another program wrote as text."""
+    """Return rows with the types of `schema`: another program may write numbers as text."""
     expected = schema({})
     for i, name in enumerate(rows.column_names):
         if rows.column_names.count(name) > 1:
