@@ -255,7 +255,8 @@ def known(names: list[str], seeds: int) -> None:
                     f"  off {100 * off / true:+6.2f} %, {off / error:+5.1f} errors"
                     f"{'' if within else '  outside'}"
                 )
-            print(f"  {str(identified).split(chr(10) * 2)[1]}", flush=True)
+            worst = min(identified.by_pieces[0].values())
+            print(f"  fits {worst:.2f} % in pieces of 1 s", flush=True)
     print(f"{inside} of {total} numbers within two errors or 0.3 %")
 
 
