@@ -12,7 +12,7 @@ import dataclasses
 import math
 import sys
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -196,13 +196,19 @@ class Trial(NamedTuple):
         self, plant: Plant, law: Component | Template | str, condition: Condition | str
     ) -> Scenario:
         """Return a run of a law, from the start of the first seed."""
-        (seed,) = self.draws.numbers(1)
+        return next(self.cases(plant, law, condition))
+
+    def cases(
+        self, plant: Plant, law: Component | Template | str, condition: Condition | str
+    ) -> Iterator[Scenario]:
+        """Yield the runs of a law, from the start of each seed."""
         starts = self.draws.starts
-        return run_of_grid(plant, law, condition, self.duration, seed=seed, starts=starts)
+        for seed in self.draws.numbers():
+            yield run_of_grid(plant, law, condition, self.duration, seed=seed, starts=starts)
 
     def check(self, laws: Mapping[str, Laws]) -> None:
         """Refuse, before gains are searched, two things of one name, your law with the name of a
-        law of the library, and conditions in which nothing moves.
+        law of the library, conditions in which nothing moves, and starts out of range.
         """
         for of_plant in laws.values():
             components = [checked_name(coerce.coerced_law(law)) for law in of_plant]
@@ -215,7 +221,7 @@ class Trial(NamedTuple):
                     names.add(item.name)
         for plant in self.plants:
             for condition in self.conditions:
-                check_moving([self.case(plant, "none", condition)])
+                check_moving(list(self.cases(plant, "none", condition)))
             if self.progress and (sentence := blind(plant, laws[plant.name])):
                 print(sentence, file=sys.stderr)
 

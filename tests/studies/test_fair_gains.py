@@ -273,3 +273,16 @@ def test_laws_that_cannot_see_what_nothing_drives_are_named_before_the_runs(tmp_
         trial.check({plant: laws})
         said = capsys.readouterr().err
         assert [law.name for law in laws if law.name in said] == names
+
+
+def test_a_start_out_of_range_is_refused_before_the_runs_of_any_seed(tmp_path):
+    xml = """<mujoco><compiler angle="radian"/><worldbody><body>
+    <joint name="j" axis="0 1 0" limited="true" range="-1 1"/><geom size=".1" pos=".2 0 0"/>
+    </body></worldbody><actuator><motor joint="j" ctrllimited="true" ctrlrange="-20 20"/></actuator>
+    </mujoco>"""
+    arm = smc.plant_from(xml, ["j"], name="arm")
+    fields = {"draws": Draws(12, smc.starts(x0=0.9, spread=0.2))}
+    trial = Trial.of([DUFFING, arm], "nominal", (), 1.0, tmp_path, **fields)
+    trial.case(arm, "none", "nominal")  # that of the first seed is in range
+    with pytest.raises(smc.ScenarioError, match=r"x0 of joint 'j'.* outside its range"):
+        trial.check({DUFFING.name: [FAST], "arm": [FAST]})
