@@ -396,6 +396,18 @@ def test_trials_of_a_slow_log_hold_a_command_for_a_long_step(rate, longest):
         np.testing.assert_allclose(long[0][name], values, atol=2e-3 * np.ptp(values))
 
 
+def test_replays_have_the_same_steps_whatever_dry_friction_is_tried():
+    """Else the cost of a search jumps where it tries no friction, and ends beside its minimum."""
+    xml, truth, log = pid_log(0.03, 0.0)
+    rig = own_rig(smc.plant_from(xml, {"j1": smc.Channel(servo=True, u_max=3.0)}), list(truth))
+    steps = set()
+    for tried_friction in (0.0, 0.3):
+        tried = rig.with_values(truth | {"j1.frictionloss": tried_friction})
+        replayed = tried.repeated(tried.part(log, 0.0, 0.1)).resolved
+        steps.add((replayed.physics_step, replayed.integrator))
+    assert len(steps) == 1
+
+
 def test_a_piece_of_a_pid_s_log_begins_with_what_its_servo_has_integrated():
     """In a replay from 1 s on, by the log up to there; imax holds the integral for a while."""
     xml, truth, log = pid_log(0.03, 0.0)

@@ -14,7 +14,7 @@ import numpy as np
 
 from smc_mujoco.common.aliases import Array
 from smc_mujoco.common.mjcb import compiled_spec
-from smc_mujoco.mechanisms.custom.model_constraints import sets_friction_solref, touches
+from smc_mujoco.mechanisms.custom.model_constraints import touches
 from smc_mujoco.mechanisms.hardware.part import Part
 from smc_mujoco.mechanisms.layout import loaded, moving_joints, state_with
 from smc_mujoco.mechanisms.plant import Plant, write_fields
@@ -143,14 +143,12 @@ def constraint_rate(plant: Plant) -> float:
 
 @functools.lru_cache(maxsize=64)
 def rubs(plant: Plant) -> bool:
-    """Return whether joints or tendons of the file have dry friction, or a softness of one that a
-    parameter adds.
+    """Return whether joints or tendons of the file have dry friction, or a parameter adds it,
+    whatever its value: the steps of a search do not depend on the number that it tries.
     """
+    if any(name.endswith(".frictionloss") for name in plant.parameters):
+        return True
     model = loaded(plant)
-    for name in plant.parameters:
-        joint, _, kind = name.rpartition(".")
-        if kind == "frictionloss" and sets_friction_solref(model, model.joint(joint).dofadr[0]):
-            return True
     return bool(np.any(model.dof_frictionloss) or np.any(model.tendon_frictionloss))
 
 
