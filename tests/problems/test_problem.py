@@ -71,6 +71,10 @@ def test_a_scenario_has_what_its_instance_drew_and_the_rules_bounds():
         assert scenario.duration == problem.duration
         assert scenario.control_period == 1e-3
         assert scenario.condition == problem.condition
+    small = smc.problem("furuta/sine@1")  # whose u_max is 1/120 of the other machines'
+    (scenario,) = small.scenarios("none", [5], SEED)
+    amplitude = 0.2 / 120 * small.instance(5, SEED).disturbance
+    assert scenario.disturbance[0].amplitude == pytest.approx(amplitude)
     (heavy,) = smc.problem("duffing/heavy@1").scenarios("pid", [3])
     assert heavy.mismatch == {
         "mass": pytest.approx(1.3 * smc.problem("duffing/heavy@1").instance(3).mass)
