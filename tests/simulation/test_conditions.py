@@ -423,3 +423,12 @@ def test_a_condition_may_be_written_as_everywhere_else():
 
 def test_another_delay_is_refused_with_its_field(refused):
     refused(lambda: find_condition("noise + delay_7ms"), "delay_7ms", "late: input_delay=0.007")
+
+
+def test_an_elastic_joint_resonates_at_the_multiple_of_its_own_rate_that_is_stated():
+    plant = smc.plant("duffing")  # a mass of 1 kg, 1.5 m from its goal
+    joint = find_condition("elastic").on(plant, 3.0)["actuator"]
+    squared = joint.stiffness * (1.0 + 1.0 / joint.rotor_inertia)
+    assert squared == pytest.approx(43.6**2 * plant.u_max / 1.5, rel=2e-3)
+    critical = 2.0 * math.sqrt(joint.stiffness / (1.0 + 1.0 / joint.rotor_inertia))
+    assert joint.damping == pytest.approx(0.01 * critical, rel=2e-3)
