@@ -102,8 +102,8 @@ def test_a_metric_that_a_response_lacks_is_no_attribute(step_response):
 def test_with_tolerances_only_their_metrics_count(step_response, tmp_path):
     r = step_response("duffing", law("duffing", "boundary_layer"), STEP, duration=0.5)
     recorded_metrics = {
-        "itae": {"value": r.itae, "tolerance": 0.0},
-        "max_u": {"value": 0.0, "tolerance": 0.0},
+        "itae": {"value": r.itae, "tolerance": 0.0, "unit": "m s^2"},
+        "max_u": {"value": 0.0, "tolerance": 0.0, "unit": "N"},
     }
     (tmp_path / "a.json").write_text(json.dumps({"one": recorded_metrics}))
     golden.compare_with_record(tmp_path / "a.json", "one", r, {"itae": 1e-9})
